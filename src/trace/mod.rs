@@ -1,0 +1,53 @@
+//! The one interface both backends implement, and the world they are built from.
+
+mod world;
+
+use glam::Vec3;
+
+use crate::ray::{Aabb, Ray};
+pub use world::{Object, Placement, Resolved, Shape, World};
+
+/// Instance levels a hit can hold: one, as Debian's Embree is built.
+pub const MAX_INSTANCE_LEVELS: usize = 1;
+
+/// "No geometry" and "no instance", as Embree's `RTC_INVALID_GEOMETRY_ID`.
+pub const INVALID_ID: u32 = u32::MAX;
+
+/// A ray's first intersection, as Embree reports it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Ray parameter along the unnormalised direction.
+    pub t: f32,
+    /// Barycentric coordinate of vertex 1.
+    pub u: f32,
+    /// Barycentric coordinate of vertex 2.
+    pub v: f32,
+    /// Base triangle.
+    pub prim: u32,
+    /// Geometry within its scene: for instanced objects always 0, else the index into [`World::top_level`].
+    pub geom: u32,
+    /// Instance stack, outermost first: index into [`World::top_level`]; [`INVALID_ID`] ends it.
+    pub inst: [u32; MAX_INSTANCE_LEVELS],
+    /// Unit geometric normal in the object's own space.
+    pub ng: Vec3,
+}
+
+/// Something that traces rays through a [`World`].
+///
+/// Rays that are not [valid](Ray::is_valid) hit nothing.
+pub trait Tracer: Sync {
+    /// The first hit with t in (tnear, tfar).
+    fn intersect(&self, ray: &Ray) -> Option<Hit>;
+
+    /// Whether there is any hit with t in (tnear, tfar).
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// The box over everything.
+    fn bounds(&self) -> Aabb;
+
+    /// Bytes of acceleration structure (the common part that any method needs).
+    fn bvh_bytes(&self) -> usize;
+
+    /// Name and version for reports, like `embree 4.3.3` or `obvhs`.
+    fn name(&self) -> String;
+}
