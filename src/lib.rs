@@ -1,6 +1,9 @@
 //! prismarch ray traces displaced surfaces without tessellating them.
 
+pub mod demo;
+pub mod image;
 pub mod prism;
 pub mod ray;
+pub mod scene;
 pub mod surface;
 pub mod trace;

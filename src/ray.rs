@@ -25,7 +25,14 @@ pub struct Ray {
 impl Ray {
     /// A ray over (0, infinity) that sees every geometry.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, direction, tnear: 0.0, tfar: f32::INFINITY, mask: u32::MAX, key: 0 }
+        Self {
+            origin,
+            direction,
+            tnear: 0.0,
+            tfar: f32::INFINITY,
+            mask: u32::MAX,
+            key: 0,
+        }
     }
 
     /// The point at parameter `t`.
@@ -55,17 +62,25 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box of nothing: `min` is +infinity and `max` -infinity.
-    pub const EMPTY: Self =
-        Self { min: Vec3::splat(f32::INFINITY), max: Vec3::splat(f32::NEG_INFINITY) };
+    pub const EMPTY: Self = Self {
+        min: Vec3::splat(f32::INFINITY),
+        max: Vec3::splat(f32::NEG_INFINITY),
+    };
 
     /// The smallest box over `self` and `p`.
     pub fn including(self, p: Vec3) -> Self {
-        Self { min: self.min.min(p), max: self.max.max(p) }
+        Self {
+            min: self.min.min(p),
+            max: self.max.max(p),
+        }
     }
 
     /// The smallest box over both.
     pub fn union(self, other: Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
     }
 
     /// True when it holds at least one point.
@@ -75,7 +90,11 @@ impl Aabb {
 
     /// Length of the diagonal; 0 for an empty box.
     pub fn diagonal(&self) -> f32 {
-        if self.is_valid() { (self.max - self.min).length() } else { 0.0 }
+        if self.is_valid() {
+            (self.max - self.min).length()
+        } else {
+            0.0
+        }
     }
 
     /// Grown outward by `ulps` units in the last place of its largest coordinate, so that f32
@@ -83,6 +102,9 @@ impl Aabb {
     pub fn padded(self, ulps: f32) -> Self {
         let reach = self.min.abs().max(self.max.abs()).max_element();
         let pad = Vec3::splat(reach * ulps * f32::EPSILON);
-        Self { min: self.min - pad, max: self.max + pad }
+        Self {
+            min: self.min - pad,
+            max: self.max + pad,
+        }
     }
 }

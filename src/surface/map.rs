@@ -38,7 +38,9 @@ pub enum MapError {
         found: usize,
     },
     /// A NaN or infinite height.
-    #[error("texel ({x}, {y}) of the map (from the bottom left) is {value}; heights must be finite")]
+    #[error(
+        "texel ({x}, {y}) of the map (from the bottom left) is {value}; heights must be finite"
+    )]
     NotFinite {
         /// Column from the left.
         x: usize,
@@ -86,7 +88,11 @@ pub struct UvTransform {
 
 impl Default for UvTransform {
     fn default() -> Self {
-        Self { scale: Vec2::ONE, rotation: 0.0, offset: Vec2::ZERO }
+        Self {
+            scale: Vec2::ONE,
+            rotation: 0.0,
+            offset: Vec2::ZERO,
+        }
     }
 }
 

@@ -111,7 +111,9 @@ impl BaseMesh {
 
     /// The box over all positions.
     pub fn bounds(&self) -> Aabb {
-        self.positions.iter().fold(Aabb::EMPTY, |b, &p| b.including(p))
+        self.positions
+            .iter()
+            .fold(Aabb::EMPTY, |b, &p| b.including(p))
     }
 
     /// Bytes held.

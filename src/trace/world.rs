@@ -81,7 +81,11 @@ impl World {
 
     /// Which object a hit is on, and through which instance.
     pub fn resolve(&self, hit: &Hit) -> Resolved<'_> {
-        let top = if hit.inst[0] == INVALID_ID { hit.geom } else { hit.inst[0] };
+        let top = if hit.inst[0] == INVALID_ID {
+            hit.geom
+        } else {
+            hit.inst[0]
+        };
         let (object, instance) = self.top_level[top as usize];
         let object = object as usize;
         let transform = match (&self.objects[object].placement, instance) {

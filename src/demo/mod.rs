@@ -1,0 +1,36 @@
+//! Six ready scenes made by the program itself: base mesh, displacement map, colour map, scene file.
+//!
+//! Everything is procedural and seeded, so that the repository stays small and every run makes the same bytes.
+
+use crate::surface::MeshBuilder;
+
+/// What a demo is made of, in memory.
+pub struct DemoFiles {
+    /// The base mesh, with normals and texture coordinates.
+    pub mesh: MeshBuilder,
+    /// Heights, bottom row first, `map_size` x `map_size`, 16 bits.
+    pub heights: Vec<u16>,
+    /// Texels across and up.
+    pub map_size: usize,
+    /// 8-bit sRGB colour map, bottom row first, `color_size` x `color_size`; empty for none.
+    pub colors: Vec<[u8; 3]>,
+    /// Texels across and up of the colour map.
+    pub color_size: usize,
+    /// The scene file (docs/scene.md). It names `NAME.obj`, `NAME_height.png` and `NAME_color.png`, and may
+    /// name a floor written as `floor.obj`.
+    pub scene: String,
+}
+
+/// One demo.
+pub struct Demo {
+    /// As on the command line.
+    pub name: &'static str,
+    /// One line for `--list`.
+    pub title: &'static str,
+    /// Base triangles, as in the paper's table.
+    pub triangles: usize,
+    /// Texels across and up of the displacement map at full size.
+    pub map_size: usize,
+    /// Makes it with a map of the given size (smaller ones are for tests).
+    pub make: fn(map_size: usize) -> DemoFiles,
+}
