@@ -117,15 +117,41 @@ pub enum SceneError {
 pub enum AssetError {
     /// A mesh file.
     #[error(transparent)]
-    Mesh(#[from] super::load::LoadError),
+    Mesh(#[from] super::load::LoadMeshError),
     /// A picture.
     #[error(transparent)]
     Image(#[from] crate::image::ImageError),
+    /// A picture inside a mesh file.
+    #[error("texture inside {}: {source}", path.display())]
+    Embedded {
+        /// The mesh file.
+        path: PathBuf,
+        /// Why.
+        source: crate::image::ImageError,
+    },
+    /// A picture inside a mesh file could not be unpacked.
+    #[error("cannot unpack the texture inside {}: {source}", path.display())]
+    Unpack {
+        /// The mesh file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The triangles of a mesh file.
+    #[error("{}: {part}: {source}", path.display())]
+    Geometry {
+        /// The mesh file.
+        path: PathBuf,
+        /// Which part of it.
+        part: String,
+        /// Why.
+        source: crate::surface::MeshError,
+    },
     /// Mesh and map do not make a displaced surface.
-    #[error("{}{source}", part.as_ref().map_or(String::new(), |p| format!("{p}: ")))]
+    #[error("{part}: {source}")]
     Surface {
         /// Which part of the mesh file.
-        part: Option<String>,
+        part: String,
         /// Why.
         source: crate::surface::SurfaceError,
     },

@@ -7,7 +7,11 @@ use glam::{Affine3A, EulerRot, Quat, Vec3};
 use super::{Item, Keyed, STEP_TEXELS, SceneError, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
 use crate::prism::{March, Step};
-use crate::surface::{Displacement, Wrap};
+use crate::surface::{UvTransform, Wrap};
+
+/// What `scale` of a displacement is.
+pub(in crate::scene) const SCALE: &str =
+    "scale, world units from height 0 to height 1: a number other than 0";
 
 /// One mesh as written.
 #[derive(Debug)]
@@ -29,11 +33,15 @@ pub(in crate::scene) struct MeshTable {
 /// A displacement as written.
 #[derive(Debug)]
 pub(in crate::scene) struct DisplacementTable {
-    /// Default: the map that the mesh file names.
+    /// The table itself, for messages.
+    pub this: Keyed<()>,
+    /// Default: the map that the mesh file names; then what follows may be the file's, too.
     pub map: Option<Keyed<PathBuf>>,
-    pub channel: Channel,
-    pub wrap: Wrap,
-    pub displacement: Displacement,
+    pub channel: Option<Channel>,
+    pub scale: Option<f32>,
+    pub midlevel: Option<f32>,
+    pub wrap: Option<Wrap>,
+    pub uv: Option<UvTransform>,
     pub march: March,
     /// Where `dt_world` stands, in world units, to be compared with the size of the mesh.
     pub world_step: Option<Keyed<f32>>,
@@ -82,29 +90,23 @@ impl MeshTable {
 
 impl DisplacementTable {
     fn read(item: Item, folder: &Path) -> Result<Self, SceneError> {
+        let this = keyed(&item, ());
         let mut section = item.section(&[
             "map", "channel", "scale", "midlevel", "wrap", "uv", "march", "dt", "dt_world",
             "jitter",
         ])?;
-        let units = "world units from height 0 to height 1: a number, not 0";
-        let scale = section
-            .require("scale", units)?
-            .number(units, |x| x != 0.0)?;
-        let midlevel = section.optional("midlevel", |i| i.number("a height", |_| true))?;
-        let uv = section.optional("uv", uv_transform)?;
         // There is one march so far: the word is checked, and says nothing else.
         section.optional("march", |i| i.word(&[("uniform", ())]))?;
         let (step, world_step) = step(&mut section)?;
         let jitter = section.optional("jitter", |i| i.boolean())?;
         Ok(Self {
+            this,
             map: section.optional("map", |i| file_path(&i, folder))?,
-            channel: section.optional("channel", channel)?.unwrap_or_default(),
-            wrap: section.optional("wrap", wrap)?.unwrap_or_default(),
-            displacement: Displacement {
-                scale,
-                midlevel: midlevel.unwrap_or(0.0),
-                uv: uv.unwrap_or_default(),
-            },
+            channel: section.optional("channel", channel)?,
+            scale: section.optional("scale", |i| i.number(SCALE, |x| x != 0.0))?,
+            midlevel: section.optional("midlevel", |i| i.number("a height", |_| true))?,
+            wrap: section.optional("wrap", wrap)?,
+            uv: section.optional("uv", uv_transform)?,
             march: March::Uniform {
                 step,
                 jitter: jitter.unwrap_or(false),
@@ -115,9 +117,9 @@ impl DisplacementTable {
 }
 
 fn channel(item: Item) -> Result<Channel, SceneError> {
-    Ok(item
-        .text("\"luminance\", \"r\", \"g\", \"b\", \"a\" or the name of an EXR channel")?
-        .into())
+    let expected = "\"luminance\", \"r\", \"g\", \"b\", \"a\" or the name of an EXR channel";
+    let Ok(channel) = item.text(expected)?.parse();
+    Ok(channel)
 }
 
 /// `dt` or `dt_world`; 1 texel by default.

@@ -11,10 +11,11 @@ use std::path::{Path, PathBuf};
 
 use super::error::{AssetError, Place, SceneError};
 use super::Film;
-pub(super) use mesh::{DisplacementTable, MeshTable};
+pub(super) use mesh::{DisplacementTable, MeshTable, SCALE};
 use reader::{Item, Section, Source};
-pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, TextureTable};
+pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, TextureTable, default_sun};
 pub(super) use view::CameraTable;
+pub(crate) use view::{MAX_SIDE, MAX_SPP, too_many_pixels};
 
 /// The least step of a march in texels, and the largest: below, a ray would take minutes.
 pub(crate) const STEP_TEXELS: std::ops::RangeInclusive<f32> = 1e-3..=1e6;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 
 use super::{Item, Keyed, SceneError, Section, file_path, fraction, keyed, uv_transform, wrap};
+use crate::image::ColorSpace;
 use crate::surface::{UvTransform, Wrap};
 
 /// A material as written.
@@ -29,7 +30,7 @@ pub(in crate::scene) enum BaseColorTable {
 #[derive(Debug)]
 pub(in crate::scene) struct TextureTable {
     pub file: Keyed<PathBuf>,
-    pub srgb: bool,
+    pub color_space: ColorSpace,
     pub wrap: Wrap,
     pub uv: UvTransform,
 }
@@ -85,12 +86,12 @@ fn base_color(item: Item, folder: &Path) -> Result<BaseColorTable, SceneError> {
     }
     let mut section = item.section(&["file", "color_space", "wrap", "uv"])?;
     let file = section.require("file", "the path of a picture")?;
-    let spaces = [("srgb", true), ("linear", false)];
+    let spaces = [("srgb", ColorSpace::Srgb), ("linear", ColorSpace::Linear)];
     Ok(BaseColorTable::Texture(TextureTable {
         file: file_path(&file, folder)?,
-        srgb: section
+        color_space: section
             .optional("color_space", |i| i.word(&spaces))?
-            .unwrap_or(true),
+            .unwrap_or(ColorSpace::Srgb),
         wrap: section.optional("wrap", wrap)?.unwrap_or_default(),
         uv: section.optional("uv", uv_transform)?.unwrap_or_default(),
     }))
@@ -156,7 +157,7 @@ impl LightTable {
     pub fn daylight() -> Vec<Self> {
         vec![
             Self::Sun {
-                direction: sun_direction(SUN_ELEVATION, SUN_AZIMUTH),
+                direction: default_sun(),
                 strength: 1.0,
             },
             Self::Sky {
@@ -170,6 +171,11 @@ impl LightTable {
 const SUN_ELEVATION: f32 = 35.0;
 const SUN_AZIMUTH: f32 = -30.0;
 const SKY_TURBIDITY: f32 = 3.0;
+
+/// Where the sun stands when nothing is said of it.
+pub(in crate::scene) fn default_sun() -> Vec3 {
+    sun_direction(SUN_ELEVATION, SUN_AZIMUTH)
+}
 
 /// The unit vector to a sun at `elevation` degrees above the horizon and `azimuth` degrees from +Z towards +X.
 fn sun_direction(elevation: f32, azimuth: f32) -> Vec3 {

@@ -29,7 +29,7 @@ impl Default for Film {
 /// The camera as written; what is left out is framed around the scene.
 #[derive(Debug)]
 pub(in crate::scene) struct CameraTable {
-    pub position: Option<Vec3>,
+    pub position: Option<Keyed<Vec3>>,
     pub target: Option<Keyed<Vec3>>,
     pub up: Option<Keyed<Vec3>>,
     /// Radians.
@@ -51,7 +51,7 @@ impl CameraTable {
     pub(super) fn read(item: Item) -> Result<Self, SceneError> {
         let mut section = item.section(&["position", "target", "up", "fov"])?;
         let point = "a point, [x, y, z]";
-        let position = section.optional("position", |i| i.vec3(point, |_| true))?;
+        let position = section.optional("position", |i| Ok(keyed(&i, i.vec3(point, |_| true)?)))?;
         let target = section.optional("target", |i| Ok(keyed(&i, i.vec3(point, |_| true)?)))?;
         let up = section.optional("up", |i| {
             let up = i.vec3("a direction, [x, y, z], not zero", |v| {
