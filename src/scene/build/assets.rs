@@ -1,7 +1,5 @@
 //! Pictures by file, each loaded once however often a scene names it.
 
-use std::collections::HashMap;
-use std::hash::Hash;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,9 +16,9 @@ use crate::surface::{DisplacementMap, Wrap};
 /// What has been loaded so far.
 #[derive(Default)]
 pub(super) struct Assets {
-    heights: HashMap<(PathBuf, String, Wrap), Arc<DisplacementMap>>,
-    colors: HashMap<(PathBuf, ColorSpace, [u32; 3]), Arc<ColorImage>>,
-    environments: HashMap<PathBuf, Arc<EnvironmentImage>>,
+    heights: Vec<((PathBuf, Channel, Wrap), Arc<DisplacementMap>)>,
+    colors: Vec<((PathBuf, ColorSpace, Vec3), Arc<ColorImage>)>,
+    environments: Vec<(PathBuf, Arc<EnvironmentImage>)>,
 }
 
 impl Assets {
@@ -31,7 +29,7 @@ impl Assets {
         channel: &Channel,
         wrap: Wrap,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
-        let key = (identity(path), channel.to_string(), wrap);
+        let key = (identity(path), channel.clone(), wrap);
         once(&mut self.heights, key, || image::load_heights(path, channel, wrap))
     }
 
@@ -42,7 +40,7 @@ impl Assets {
         space: ColorSpace,
         tint: Vec3,
     ) -> Result<Arc<ColorImage>, AssetError> {
-        let key = (identity(path), space, tint.to_array().map(f32::to_bits));
+        let key = (identity(path), space, tint);
         once(&mut self.colors, key, || {
             Ok(tinted(image::load_color(path, space)?, tint))
         })
@@ -55,26 +53,26 @@ impl Assets {
         })
     }
 
-    /// The displacement maps, in the order of their paths.
+    /// The displacement maps, in the order of their first use.
     pub fn into_maps(self) -> Vec<MapFile> {
-        let file = |((path, ..), map)| MapFile { path, map };
-        let mut maps: Vec<_> = self.heights.into_iter().map(file).collect();
-        maps.sort_by(|a, b| a.path.cmp(&b.path));
-        maps
+        let maps = self.heights.into_iter();
+        maps.map(|((path, ..), map)| MapFile { path, map })
+            .collect()
     }
 }
 
-fn once<K: Eq + Hash, T>(
-    loaded: &mut HashMap<K, Arc<T>>,
+/// What `known` has for `key`, else what `load` gives. A scene names few files: no hashing is needed.
+fn once<K: PartialEq, T>(
+    known: &mut Vec<(K, Arc<T>)>,
     key: K,
     load: impl FnOnce() -> Result<T, ImageError>,
 ) -> Result<Arc<T>, AssetError> {
-    if let Some(known) = loaded.get(&key) {
-        return Ok(known.clone());
+    if let Some((_, asset)) = known.iter().find(|(k, _)| *k == key) {
+        return Ok(asset.clone());
     }
-    let new = Arc::new(load()?);
-    loaded.insert(key, new.clone());
-    Ok(new)
+    let asset = Arc::new(load()?);
+    known.push((key, asset.clone()));
+    Ok(asset)
 }
 
 /// The same for every way to write a path; the path as it is where the file does not exist.

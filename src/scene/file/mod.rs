@@ -13,7 +13,7 @@ use super::error::{AssetError, Place, SceneError};
 use super::Film;
 pub(super) use mesh::{DisplacementTable, MeshTable, SCALE};
 use reader::{Item, Section, Source};
-pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, TextureTable, default_sun};
+pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, default_sun};
 pub(super) use view::CameraTable;
 pub(crate) use view::{MAX_SIDE, MAX_SPP, too_many_pixels};
 
