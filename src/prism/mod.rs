@@ -15,6 +15,8 @@ mod normal;
 mod path;
 mod sides;
 mod simd;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
