@@ -19,5 +19,6 @@ mod uv;
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
 pub use map::{DisplacementMap, HeightSample, MapError, Texels};
 pub use mesh::{BaseMesh, MeshBuilder, MeshError, MeshReport, NormalMode};
+pub(crate) use patch::solve;
 pub use patch::{Patch, PatchPoint};
 pub use uv::{UvTransform, Wrap};

@@ -62,6 +62,46 @@ impl Patch<'_> {
         (b - a).cross(c - a).normalize()
     }
 
+    /// |N'(b)| at its smallest over the triangle, from below: |N'|^2 = 1 - sum b_i b_j |n_i - n_j|^2 and the sum
+    /// of the b_i b_j is at most 1/3. Never less than [`Self::LEAST_NORMAL`].
+    pub fn shortest_normal(&self) -> f64 {
+        let [a, b, c] = self.normals;
+        let spread = a
+            .distance_squared(b)
+            .max(b.distance_squared(c))
+            .max(c.distance_squared(a));
+        (1.0 - spread / 3.0)
+            .max(Self::LEAST_NORMAL * Self::LEAST_NORMAL)
+            .sqrt()
+    }
+
+    /// The range of w = D / |N'| for D in `range`.
+    pub fn offsets(&self, [low, high]: [f64; 2]) -> [f64; 2] {
+        let shortest = self.shortest_normal();
+        [low.min(low / shortest), high.max(high / shortest)]
+    }
+
+    /// Where opposed normals cancel to less than this, the surface is cut off.
+    pub const LEAST_NORMAL: f64 = 1e-3;
+
+    /// The exact inverse of P(b) + w N'(b) = x near a guess, by Newton's method: (u, v, w), or `None` where it does
+    /// not converge.
+    pub fn project(&self, x: DVec3, mut u: f64, mut v: f64) -> Option<DVec3> {
+        let face = self.face_normal();
+        let mut w = (x - self.base(u, v)).dot(face) / self.normal(u, v).dot(face);
+        for _ in 0..16 {
+            let normal = self.normal(u, v);
+            let du = self.vertices[1] - self.vertices[0] + w * (self.normals[1] - self.normals[0]);
+            let dv = self.vertices[2] - self.vertices[0] + w * (self.normals[2] - self.normals[0]);
+            let step = solve([du, dv, normal], x - self.base(u, v) - w * normal)?;
+            (u, v, w) = (u + step.x, v + step.y, w + step.z);
+            if step.x.abs().max(step.y.abs()) < 1e-12 {
+                return Some(DVec3::new(u, v, w));
+            }
+        }
+        None
+    }
+
     /// S, dS/du and dS/dv at b:
     /// dS = dP + dD N + D (dN' - N (N . dN')) / |N'| with N = N'/|N'|.
     pub fn point(&self, u: f64, v: f64) -> PatchPoint {
@@ -84,6 +124,13 @@ impl Patch<'_> {
             displacement,
         }
     }
+}
+
+/// The solution of [a b c] x = r by Cramer's rule; `None` for a singular or non-finite system.
+pub(crate) fn solve([a, b, c]: [DVec3; 3], r: DVec3) -> Option<DVec3> {
+    let bc = b.cross(c);
+    let x = DVec3::new(r.dot(bc), a.dot(r.cross(c)), a.dot(b.cross(r))) / a.dot(bc);
+    x.is_finite().then_some(x)
 }
 
 fn weighted(x: &[DVec3; 3], u: f64, v: f64) -> DVec3 {
@@ -130,5 +177,8 @@ mod tests {
         let dv = (patch.point(u, v + e).position - patch.point(u, v - e).position) / (2.0 * e);
         assert!((p.du - du).length() < 1e-8 && (p.dv - dv).length() < 1e-8);
         assert!((p.displacement - patch.displacement(u, v)).abs() < 1e-15);
+        let x = patch.base(u, v) + 0.3 * patch.normal(u, v);
+        let found = patch.project(x, 0.1, 0.1).unwrap();
+        assert!((found - DVec3::new(u, v, 0.3)).length() < 1e-10);
     }
 }
