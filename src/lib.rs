@@ -1,5 +1,6 @@
 //! prismarch ray traces displaced surfaces without tessellating them.
 
+pub mod cli;
 pub mod demo;
 pub mod image;
 pub mod prism;

@@ -27,9 +27,6 @@ use crate::surface::{
 };
 use assets::Assets;
 
-/// The smallest world step, as a part of the diagonal of the mesh: below, a ray would take minutes.
-const MIN_WORLD_STEP: f32 = 1e-6;
-
 /// A displacement map and the file it is from, for reports.
 #[derive(Clone, Debug)]
 pub struct MapFile {
@@ -231,13 +228,6 @@ impl Builder {
         name: &str,
         mesh: Arc<BaseMesh>,
     ) -> Result<ObjectShape, SceneError> {
-        if let Some(step) = &table.world_step {
-            let least = MIN_WORLD_STEP * mesh.bounds().diagonal();
-            if step.value < least {
-                let expected = format!("at least {least}, a millionth of the mesh's diagonal");
-                return Err(step.refuse(step.value.to_string(), expected));
-            }
-        }
         let by_file = by_file.filter(|_| table.map.is_none());
         let (path, at) = match (&table.map, by_file) {
             (Some(map), _) => (&map.value, map),

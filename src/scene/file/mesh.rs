@@ -43,8 +43,6 @@ pub(in crate::scene) struct DisplacementTable {
     pub wrap: Option<Wrap>,
     pub uv: Option<UvTransform>,
     pub march: March,
-    /// Where `dt_world` stands, in world units, to be compared with the size of the mesh.
-    pub world_step: Option<Keyed<f32>>,
 }
 
 impl MeshTable {
@@ -97,7 +95,7 @@ impl DisplacementTable {
         ])?;
         // There is one march so far: the word is checked, and says nothing else.
         section.optional("march", |i| i.word(&[("uniform", ())]))?;
-        let (step, world_step) = step(&mut section)?;
+        let step = step(&mut section)?;
         let jitter = section.optional("jitter", |i| i.boolean())?;
         Ok(Self {
             this,
@@ -111,7 +109,6 @@ impl DisplacementTable {
                 step,
                 jitter: jitter.unwrap_or(false),
             },
-            world_step,
         })
     }
 }
@@ -123,20 +120,20 @@ fn channel(item: Item) -> Result<Channel, SceneError> {
 }
 
 /// `dt` or `dt_world`; 1 texel by default.
-fn step(section: &mut super::Section) -> Result<(Step, Option<Keyed<f32>>), SceneError> {
+fn step(section: &mut super::Section) -> Result<Step, SceneError> {
     let texels = section.optional("dt", |i| {
         let (low, high) = (STEP_TEXELS.start(), STEP_TEXELS.end());
         let expected = format!("texels per step, from {low} to {high}");
         i.number(&expected, |x| STEP_TEXELS.contains(&x))
     })?;
     let Some(item) = section.get("dt_world") else {
-        return Ok((Step::Texels(texels.unwrap_or(1.0)), None));
+        return Ok(Step::Texels(texels.unwrap_or(1.0)));
     };
     if texels.is_some() {
         return Err(item.error("dt and dt_world", "only one of them"));
     }
     let length = item.number("world units per step, above 0", |x| x > 0.0)?;
-    Ok((Step::World(length), Some(keyed(&item, length))))
+    Ok(Step::World(length))
 }
 
 fn instances(item: Item) -> Result<Vec<Affine3A>, SceneError> {

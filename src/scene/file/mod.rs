@@ -17,7 +17,7 @@ pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, default_sun}
 pub(super) use view::CameraTable;
 pub(crate) use view::{MAX_SIDE, MAX_SPP, too_many_pixels};
 
-/// The least step of a march in texels, and the largest: below, a ray would take minutes.
+/// The least step of a march in texels, and the largest: beyond, a ray would take minutes or see nothing.
 pub(crate) const STEP_TEXELS: std::ops::RangeInclusive<f32> = 1e-3..=1e6;
 
 /// A whole scene file.

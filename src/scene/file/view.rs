@@ -8,7 +8,7 @@ use crate::scene::{Film, ToneCurve};
 /// Largest width and height of a picture.
 pub(crate) const MAX_SIDE: u32 = 65_536;
 /// Most pixels of a picture: 2^28, which is 3 GB of linear RGB.
-pub(crate) const MAX_PIXELS: u64 = 1 << 28;
+const MAX_PIXELS: u64 = 1 << 28;
 /// Most samples per pixel.
 pub(crate) const MAX_SPP: u32 = 1 << 20;
 
@@ -82,8 +82,8 @@ pub(super) fn film(item: Item) -> Result<Film, SceneError> {
     }
     if let Some(item) = section.get("height") {
         film.height = item.integer(1..=MAX_SIDE)?;
-        if let Some(found) = too_many_pixels(film.width, film.height) {
-            return Err(item.error(found, format!("at most {MAX_PIXELS} pixels")));
+        if let Some((found, most)) = too_many_pixels(film.width, film.height) {
+            return Err(item.error(found, format!("at most {most} pixels")));
         }
     }
     if let Some(spp) = section.optional("spp", |i| i.integer(1..=MAX_SPP))? {
@@ -107,8 +107,9 @@ pub(super) fn film(item: Item) -> Result<Film, SceneError> {
     Ok(film)
 }
 
-/// What is found, if a picture of this size has more than [`MAX_PIXELS`].
-pub(crate) fn too_many_pixels(width: u32, height: u32) -> Option<String> {
+/// The size as found and the most pixels allowed, if a picture of this size has more.
+pub(crate) fn too_many_pixels(width: u32, height: u32) -> Option<(String, u64)> {
     let pixels = u64::from(width) * u64::from(height);
-    (pixels > MAX_PIXELS).then(|| format!("{width}x{height} = {pixels} pixels"))
+    let found = || format!("{width}x{height} = {pixels} pixels");
+    (pixels > MAX_PIXELS).then(|| (found(), MAX_PIXELS))
 }
