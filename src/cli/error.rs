@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::rays::RayError;
 use crate::demo::WriteDemoError;
 use crate::image::OutputError;
+use crate::prism::MarchError;
 use crate::scene::{AssetError, SceneError};
 
 /// Exit code of wrong usage; clap's own.
@@ -28,6 +29,9 @@ pub enum CliError {
     /// A file named on the command line.
     #[error(transparent)]
     Asset(#[from] AssetError),
+    /// How a surface is to be marched.
+    #[error(transparent)]
+    March(#[from] MarchError),
     /// The ray table.
     #[error(transparent)]
     Rays(#[from] RayError),
@@ -74,7 +78,7 @@ impl CliError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::PictureFormat { .. } => USAGE,
-            Self::Scene(_) | Self::Asset(_) | Self::Rays(_) => INPUT,
+            Self::Scene(_) | Self::Asset(_) | Self::March(_) | Self::Rays(_) => INPUT,
             Self::Backend { .. } | Self::Threads { .. } => FAILED,
             Self::Output(_) | Self::Demo(_) | Self::Stdout(_) => OUTPUT,
             Self::ReaderGone => 0,

@@ -37,7 +37,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.start_threads()?;
     let loaded = Loaded::from_file(&args.scene)?;
     super::warn(&loaded.warnings);
-    let world = loaded.scene.world();
+    let world = loaded.scene.world()?;
     let engine = args.engine.build(&world)?;
     let info = Info {
         scene: args.scene.display().to_string(),

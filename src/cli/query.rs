@@ -116,7 +116,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut loaded = args.load()?;
     super::warn(&loaded.warnings);
     args.override_march(&mut loaded.scene);
-    let world = loaded.scene.world();
+    let world = loaded.scene.world()?;
     let engine = args.engine.build(&world)?;
     let query = Query {
         world: &world,

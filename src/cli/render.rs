@@ -107,7 +107,7 @@ impl Job<'_> {
         super::warn(&loaded.warnings);
         self.film.apply(&mut loaded.scene.film);
         let load = clock.lap();
-        let world = loaded.scene.world();
+        let world = loaded.scene.world()?;
         let engine = self.engine.build(&world)?;
         let build = clock.lap();
         let picture = self.render(&loaded, &world, &*engine);
