@@ -1,38 +1,56 @@
-//! Writing pictures. All rows are bottom first, as in memory; the files hold them top first, as their formats want.
+//! Writing pictures.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::Path;
 
+use exr::meta::attribute::AttributeValue;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text,
     WritableImage,
 };
-use exr::meta::attribute::AttributeValue;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::atomic::{self, OutputError};
 
-/// Writes an 8-bit RGB PNG, `pixels` sRGB-encoded, bottom row first.
+/// Which row of a picture in memory is the first. Maps start at the bottom, where v = 0; film at the top.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rows {
+    /// The first row is the bottom of the picture.
+    BottomFirst,
+    /// The first row is the top of the picture.
+    TopFirst,
+}
+
+/// Writes an 8-bit RGB PNG, `pixels` sRGB-encoded.
 pub fn write_png_rgb8(
     path: &Path,
     width: usize,
     height: usize,
+    rows: Rows,
     pixels: &[[u8; 3]],
 ) -> Result<(), OutputError> {
-    let rows = flipped(path, width, height, pixels)?;
-    write_png(path, width, height, rows.as_flattened(), ExtendedColorType::Rgb8)
+    let pixels = top_first(path, width, height, rows, pixels)?;
+    write_png(
+        path,
+        width,
+        height,
+        pixels.as_flattened(),
+        ExtendedColorType::Rgb8,
+    )
 }
 
-/// Writes a 16-bit grey PNG, bottom row first. Fast rather than small: maps of 8192x8192 take a few seconds.
+/// Writes a 16-bit grey PNG, a height map with its bottom row first. Fast rather than small.
 pub fn write_png_gray16(
     path: &Path,
     width: usize,
     height: usize,
     heights: &[u16],
 ) -> Result<(), OutputError> {
-    let rows = flipped(path, width, height, heights)?;
-    write_png(path, width, height, bytemuck::cast_slice(&rows), ExtendedColorType::L16)
+    let heights = top_first(path, width, height, Rows::BottomFirst, heights)?;
+    let bytes = bytemuck::cast_slice(&heights);
+    write_png(path, width, height, bytes, ExtendedColorType::L16)
 }
 
 fn write_png(
@@ -59,7 +77,7 @@ fn write_png(
 pub struct ExrChannel {
     /// `R`, `G`, `B`, `A`, or `layer.channel`, as OpenEXR names the channels of layers.
     pub name: String,
-    /// Samples, bottom row first.
+    /// Samples, row by row.
     pub samples: Vec<f32>,
 }
 
@@ -84,15 +102,19 @@ pub fn write_exr(
     path: &Path,
     width: usize,
     height: usize,
+    rows: Rows,
     channels: Vec<ExrChannel>,
     attributes: &[(&str, &str)],
 ) -> Result<(), OutputError> {
     let mut list = Vec::with_capacity(channels.len());
     for channel in channels {
-        let rows = flipped(path, width, height, &channel.samples)?;
-        list.push(AnyChannel::new(text(path, &channel.name)?, FlatSamples::F32(rows)));
+        let samples = top_first(path, width, height, rows, &channel.samples)?;
+        let name = text(path, &channel.name)?;
+        list.push(AnyChannel::new(
+            name,
+            FlatSamples::F32(samples.into_owned()),
+        ));
     }
-    list.sort_by(|a, b| a.name.cmp(&b.name));
     let mut header = LayerAttributes::default();
     for (name, value) in attributes {
         header
@@ -102,8 +124,8 @@ pub fn write_exr(
     let layer = Layer::new(
         (width, height),
         header,
-        Encoding::SMALL_FAST_LOSSLESS,
-        AnyChannels { list: list.into() },
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(list.into()),
     );
     let picture = Image::from_layer(layer);
     atomic::write(path, |file| {
@@ -126,13 +148,14 @@ fn text(path: &Path, value: &str) -> Result<Text, OutputError> {
     })
 }
 
-/// Rows in the opposite order, when there are as many pixels as the size says.
-fn flipped<T: Copy>(
+/// The pixels as files want them, when there are as many as the size says.
+fn top_first<'a, T: Copy>(
     path: &Path,
     width: usize,
     height: usize,
-    pixels: &[T],
-) -> Result<Vec<T>, OutputError> {
+    rows: Rows,
+    pixels: &'a [T],
+) -> Result<Cow<'a, [T]>, OutputError> {
     if width == 0 || height == 0 || width.checked_mul(height) != Some(pixels.len()) {
         return Err(OutputError::WrongSize {
             path: path.to_owned(),
@@ -141,11 +164,16 @@ fn flipped<T: Copy>(
             found: pixels.len(),
         });
     }
-    let mut rows = Vec::with_capacity(pixels.len());
-    for row in pixels.chunks_exact(width).rev() {
-        rows.extend_from_slice(row);
-    }
-    Ok(rows)
+    Ok(match rows {
+        Rows::TopFirst => Cow::Borrowed(pixels),
+        Rows::BottomFirst => {
+            let mut flipped = Vec::with_capacity(pixels.len());
+            for row in pixels.chunks_exact(width).rev() {
+                flipped.extend_from_slice(row);
+            }
+            Cow::Owned(flipped)
+        }
+    })
 }
 
 #[cfg(test)]

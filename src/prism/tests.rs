@@ -147,7 +147,10 @@ fn agree(prisms: &Prisms, ray: &Ray) -> Result<(), TestCaseError> {
                 .into_iter()
                 .chain(got.map(|h| f64::from(h.t)))
                 .fold(f64::INFINITY, f64::min);
-            let beyond = Ray { tnear: (t + 1e-6) as f32, ..*ray };
+            let beyond = Ray {
+                tnear: (t + 1e-6) as f32,
+                ..*ray
+            };
             let next = oracle(&patch, &beyond, prisms.bounds(0)).unwrap_or(f64::INFINITY);
             let sliver = (next - t) * f64::from(ray.direction.length()) < 0.005;
             let p = patch.project((ray.at(t as f32)).as_dvec3(), 0.3, 0.3);
@@ -157,7 +160,10 @@ fn agree(prisms: &Prisms, ray: &Ray) -> Result<(), TestCaseError> {
                 let ng = q.du.cross(q.dv).normalize();
                 ng.dot(ray.direction.as_dvec3().normalize()).abs() < 0.05
             });
-            prop_assert!(at_rim || grazing || sliver, "oracle {want:?}, kernel {got:?}");
+            prop_assert!(
+                at_rim || grazing || sliver,
+                "oracle {want:?}, kernel {got:?}"
+            );
             Ok(())
         }
     }
