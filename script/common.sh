@@ -2,6 +2,7 @@
 # shellcheck shell=bash
 
 # The checkout, wherever the script was called from.
+# shellcheck disable=SC2034 # for the scripts that source this
 checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 
 say() { printf '==> %s\n' "$*" >&2; }

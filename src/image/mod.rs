@@ -27,7 +27,7 @@ pub use error::ImageError;
 pub use format::Format;
 pub use heights::load_heights;
 pub use srgb::{srgb_decode, srgb_encode};
-pub use write::{ExrChannel, Rows, write_exr, write_png_gray16, write_png_rgb8};
+pub use write::{ExrChannel, write_exr, write_png_gray16, write_png_rgb8};
 
 /// Most pixels of a picture that is read: 32768 x 16384.
 pub const MAX_PIXELS: u64 = 1 << 29;

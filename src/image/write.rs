@@ -1,6 +1,5 @@
-//! Writing pictures.
+//! Writing pictures. Rows are bottom first, as in memory; files hold them top first, as their formats want.
 
-use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -14,24 +13,14 @@ use image::{ExtendedColorType, ImageEncoder};
 
 use super::atomic::{self, OutputError};
 
-/// Which row of a picture in memory is the first. Maps start at the bottom, where v = 0; film at the top.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rows {
-    /// The first row is the bottom of the picture.
-    BottomFirst,
-    /// The first row is the top of the picture.
-    TopFirst,
-}
-
-/// Writes an 8-bit RGB PNG, `pixels` sRGB-encoded.
+/// Writes an 8-bit RGB PNG, `pixels` sRGB-encoded, bottom row first.
 pub fn write_png_rgb8(
     path: &Path,
     width: usize,
     height: usize,
-    rows: Rows,
     pixels: &[[u8; 3]],
 ) -> Result<(), OutputError> {
-    let pixels = top_first(path, width, height, rows, pixels)?;
+    let pixels = top_first(path, width, height, pixels)?;
     write_png(
         path,
         width,
@@ -41,14 +30,14 @@ pub fn write_png_rgb8(
     )
 }
 
-/// Writes a 16-bit grey PNG, a height map with its bottom row first. Fast rather than small.
+/// Writes a 16-bit grey PNG, bottom row first. Fast rather than small.
 pub fn write_png_gray16(
     path: &Path,
     width: usize,
     height: usize,
     heights: &[u16],
 ) -> Result<(), OutputError> {
-    let heights = top_first(path, width, height, Rows::BottomFirst, heights)?;
+    let heights = top_first(path, width, height, heights)?;
     let bytes = bytemuck::cast_slice(&heights);
     write_png(path, width, height, bytes, ExtendedColorType::L16)
 }
@@ -77,7 +66,7 @@ fn write_png(
 pub struct ExrChannel {
     /// `R`, `G`, `B`, `A`, or `layer.channel`, as OpenEXR names the channels of layers.
     pub name: String,
-    /// Samples, row by row.
+    /// Samples, bottom row first.
     pub samples: Vec<f32>,
 }
 
@@ -102,18 +91,14 @@ pub fn write_exr(
     path: &Path,
     width: usize,
     height: usize,
-    rows: Rows,
     channels: Vec<ExrChannel>,
     attributes: &[(&str, &str)],
 ) -> Result<(), OutputError> {
     let mut list = Vec::with_capacity(channels.len());
     for channel in channels {
-        let samples = top_first(path, width, height, rows, &channel.samples)?;
+        let samples = top_first(path, width, height, &channel.samples)?;
         let name = text(path, &channel.name)?;
-        list.push(AnyChannel::new(
-            name,
-            FlatSamples::F32(samples.into_owned()),
-        ));
+        list.push(AnyChannel::new(name, FlatSamples::F32(samples)));
     }
     let mut header = LayerAttributes::default();
     for (name, value) in attributes {
@@ -149,13 +134,12 @@ fn text(path: &Path, value: &str) -> Result<Text, OutputError> {
 }
 
 /// The pixels as files want them, when there are as many as the size says.
-fn top_first<'a, T: Copy>(
+fn top_first<T: Copy>(
     path: &Path,
     width: usize,
     height: usize,
-    rows: Rows,
-    pixels: &'a [T],
-) -> Result<Cow<'a, [T]>, OutputError> {
+    pixels: &[T],
+) -> Result<Vec<T>, OutputError> {
     if width == 0 || height == 0 || width.checked_mul(height) != Some(pixels.len()) {
         return Err(OutputError::WrongSize {
             path: path.to_owned(),
@@ -164,16 +148,11 @@ fn top_first<'a, T: Copy>(
             found: pixels.len(),
         });
     }
-    Ok(match rows {
-        Rows::TopFirst => Cow::Borrowed(pixels),
-        Rows::BottomFirst => {
-            let mut flipped = Vec::with_capacity(pixels.len());
-            for row in pixels.chunks_exact(width).rev() {
-                flipped.extend_from_slice(row);
-            }
-            Cow::Owned(flipped)
-        }
-    })
+    let mut flipped = Vec::with_capacity(pixels.len());
+    for row in pixels.chunks_exact(width).rev() {
+        flipped.extend_from_slice(row);
+    }
+    Ok(flipped)
 }
 
 #[cfg(test)]

@@ -2,12 +2,14 @@ use image::{ImageFormat, Rgb, Rgb32FImage};
 
 use super::*;
 use crate::image::test_files::{Folder, each_tenth};
-use crate::image::{ExrChannel, Rows, write_exr};
+use crate::image::{ExrChannel, write_exr};
 
+/// Rows of two pixels, the top one first.
 fn exr(folder: &Folder, pixels: &[[f32; 3]]) -> std::path::PathBuf {
     let path = folder.path("sky.exr");
-    let channels = ExrChannel::rgb(None, pixels).to_vec();
-    write_exr(&path, 2, pixels.len() / 2, Rows::TopFirst, channels, &[]).unwrap();
+    let bottom_first: Vec<_> = pixels.chunks(2).rev().flatten().copied().collect();
+    let channels = ExrChannel::rgb(None, &bottom_first).to_vec();
+    write_exr(&path, 2, pixels.len() / 2, channels, &[]).unwrap();
     path
 }
 

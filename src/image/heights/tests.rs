@@ -6,7 +6,7 @@ use tiff::encoder::colortype;
 
 use super::*;
 use crate::image::test_files::{Folder, each_tenth};
-use crate::image::{ExrChannel, Rows, write_exr, write_png_gray16};
+use crate::image::{ExrChannel, write_exr, write_png_gray16};
 
 fn texels(path: &Path, channel: &str) -> Result<(usize, usize, Texels), ImageError> {
     let Ok(channel) = channel.parse();
@@ -303,7 +303,7 @@ fn a_height_that_is_not_finite_is_refused_with_its_place() {
         name: "Y".to_owned(),
         samples,
     };
-    write_exr(&path, 2, 3, Rows::BottomFirst, vec![channel], &[]).unwrap();
+    write_exr(&path, 2, 3, vec![channel], &[]).unwrap();
     let error = load(&path).unwrap_err();
     assert!(matches!(error, ImageError::Map { .. }));
     let error = error.to_string();
