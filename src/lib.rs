@@ -1,6 +1,8 @@
 //! prismarch ray traces displaced surfaces without tessellating them.
 
 pub mod demo;
+#[cfg(feature = "embree")]
+pub mod embree;
 pub mod image;
 pub mod prism;
 pub mod ray;
