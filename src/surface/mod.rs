@@ -13,6 +13,7 @@
 mod displaced;
 mod map;
 mod mesh;
+mod normals;
 
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
 pub use map::{DisplacementMap, MapError, Texels, UvTransform, Wrap};
