@@ -2,6 +2,8 @@
 //!
 //! `file -> Scene -> World -> Tracer`; the renderer reads the rest (camera, film, materials, lights) from here.
 
+pub mod load;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
