@@ -3,6 +3,8 @@
 #[cfg(feature = "bvh")]
 pub mod bvh;
 pub mod demo;
+#[cfg(feature = "embree")]
+pub mod embree;
 pub mod image;
 pub mod prism;
 pub mod ray;
