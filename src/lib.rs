@@ -1,5 +1,7 @@
 //! prismarch ray traces displaced surfaces without tessellating them.
 
+#[cfg(feature = "bvh")]
+pub mod bvh;
 pub mod demo;
 #[cfg(feature = "embree")]
 pub mod embree;
