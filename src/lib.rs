@@ -2,6 +2,7 @@
 
 #[cfg(feature = "bvh")]
 pub mod bvh;
+pub mod cli;
 pub mod demo;
 #[cfg(feature = "embree")]
 pub mod embree;
