@@ -9,6 +9,7 @@ pub mod embree;
 pub mod image;
 pub mod prism;
 pub mod ray;
+pub mod render;
 pub mod scene;
 pub mod surface;
 pub mod trace;

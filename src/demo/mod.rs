@@ -7,8 +7,10 @@ mod laws;
 mod noise;
 mod paint;
 mod shape;
+mod write;
 
 use crate::surface::MeshBuilder;
+pub use write::WriteDemoError;
 
 /// What a demo is made of, in memory.
 pub struct DemoFiles {
