@@ -11,8 +11,10 @@ mod noise;
 mod paint;
 mod scatter;
 mod shape;
+mod write;
 
 use crate::surface::MeshBuilder;
+pub use write::WriteDemoError;
 
 /// What a demo is made of, in memory.
 pub struct DemoFiles {
