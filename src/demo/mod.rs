@@ -2,10 +2,14 @@
 //!
 //! Everything is procedural and seeded, so that the repository stays small and every run makes the same bytes.
 
+mod asteroid;
+mod chainmail;
+mod drape;
 #[cfg(test)]
 mod laws;
 mod noise;
 mod paint;
+mod scatter;
 mod shape;
 mod write;
 
@@ -44,7 +48,7 @@ pub struct Demo {
 }
 
 /// The demos, in the order of `--list`.
-pub const DEMOS: &[Demo] = &[];
+pub const DEMOS: &[Demo] = &[asteroid::DEMO, chainmail::DEMO];
 
 /// The demo of that name.
 pub fn find(name: &str) -> Option<&'static Demo> {
