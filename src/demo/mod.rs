@@ -2,11 +2,16 @@
 //!
 //! Everything is procedural and seeded, so that the repository stays small and every run makes the same bytes.
 
+mod cavity;
 #[cfg(test)]
 mod laws;
+mod dragon;
 mod noise;
+mod orb;
 mod paint;
 mod shape;
+mod stump;
+mod sweep;
 
 use crate::surface::MeshBuilder;
 
@@ -42,7 +47,7 @@ pub struct Demo {
 }
 
 /// The demos, in the order of `--list`.
-pub const DEMOS: &[Demo] = &[];
+pub const DEMOS: &[Demo] = &[orb::DEMO, stump::DEMO, dragon::DEMO];
 
 /// The demo of that name.
 pub fn find(name: &str) -> Option<&'static Demo> {
