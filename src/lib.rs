@@ -4,6 +4,7 @@ pub mod demo;
 pub mod image;
 pub mod prism;
 pub mod ray;
+pub mod render;
 pub mod scene;
 pub mod surface;
 pub mod trace;
