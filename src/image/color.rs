@@ -150,7 +150,14 @@ fn linear_image(
     height: usize,
     pixels: Vec<[f32; 3]>,
 ) -> Result<ColorImage, ImageError> {
-    check_pixels(path, width, height, &pixels, f32::is_finite, "colours must be finite")?;
+    check_pixels(
+        path,
+        width,
+        height,
+        &pixels,
+        f32::is_finite,
+        "colours must be finite",
+    )?;
     Ok(ColorImage {
         width,
         height,

@@ -3,11 +3,11 @@
 use std::io::{self, Write};
 use std::path::Path;
 
+use exr::meta::attribute::AttributeValue;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text,
     WritableImage,
 };
-use exr::meta::attribute::AttributeValue;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
@@ -21,7 +21,13 @@ pub fn write_png_rgb8(
     pixels: &[[u8; 3]],
 ) -> Result<(), OutputError> {
     let rows = flipped(path, width, height, pixels)?;
-    write_png(path, width, height, rows.as_flattened(), ExtendedColorType::Rgb8)
+    write_png(
+        path,
+        width,
+        height,
+        rows.as_flattened(),
+        ExtendedColorType::Rgb8,
+    )
 }
 
 /// Writes a 16-bit grey PNG, bottom row first. Fast rather than small: maps of 8192x8192 take a few seconds.
@@ -32,7 +38,13 @@ pub fn write_png_gray16(
     heights: &[u16],
 ) -> Result<(), OutputError> {
     let rows = flipped(path, width, height, heights)?;
-    write_png(path, width, height, bytemuck::cast_slice(&rows), ExtendedColorType::L16)
+    write_png(
+        path,
+        width,
+        height,
+        bytemuck::cast_slice(&rows),
+        ExtendedColorType::L16,
+    )
 }
 
 fn write_png(
@@ -90,7 +102,10 @@ pub fn write_exr(
     let mut list = Vec::with_capacity(channels.len());
     for channel in channels {
         let rows = flipped(path, width, height, &channel.samples)?;
-        list.push(AnyChannel::new(text(path, &channel.name)?, FlatSamples::F32(rows)));
+        list.push(AnyChannel::new(
+            text(path, &channel.name)?,
+            FlatSamples::F32(rows),
+        ));
     }
     list.sort_by(|a, b| a.name.cmp(&b.name));
     let mut header = LayerAttributes::default();
