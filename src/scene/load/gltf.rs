@@ -1,0 +1,353 @@
+//! glTF 2.0 and GLB through the gltf crate.
+//!
+//! All triangles of the default scene, node transforms baked in. The crate's accessor readers panic on data
+//! that is not there, so every accessor is checked against its buffer before it is read.
+
+use std::path::Path;
+
+use ::gltf as crate_gltf;
+use crate_gltf::accessor::{Accessor, DataType, Dimensions};
+use crate_gltf::mesh::Mode;
+use crate_gltf::{Document, Gltf, Primitive, Semantic};
+use glam::{Affine3A, Mat4, Vec2, Vec3};
+
+use super::{FileMaterial, FileTexture, LoadMeshErrorKind, LoadedFile, Parts, beside};
+use crate::surface::MeshBuilder;
+
+/// Reads the bytes of the file at `path`.
+pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+    check_glb_header(bytes)?;
+    let gltf = Gltf::from_slice(bytes).map_err(|e| malformed("glTF document", e.to_string()))?;
+    let buffers = read_buffers(&gltf, path)?;
+    let Gltf { document, .. } = gltf;
+    let scene = document
+        .default_scene()
+        .or_else(|| document.scenes().next())
+        .ok_or_else(|| malformed("glTF document", "it has no scene"))?;
+    let mut parts = Parts::default();
+    let mut seen = vec![false; document.nodes().len()];
+    let mut pending: Vec<_> = scene.nodes().map(|n| (n, Affine3A::IDENTITY)).collect();
+    // The last in is taken first: reversed, nodes come in file order.
+    pending.reverse();
+    while let Some((node, parent)) = pending.pop() {
+        if std::mem::replace(&mut seen[node.index()], true) {
+            let what = format!("node {}", node.index());
+            return Err(malformed(
+                &what,
+                "it has two parents or is its own ancestor",
+            ));
+        }
+        let local = Affine3A::from_mat4(Mat4::from_cols_array_2d(&node.transform().matrix()));
+        let to_world = parent * local;
+        let first_child = pending.len();
+        pending.extend(node.children().map(|child| (child, to_world)));
+        pending[first_child..].reverse();
+        let Some(mesh) = node.mesh() else { continue };
+        let name = node.name().or(mesh.name()).unwrap_or("");
+        for primitive in mesh.primitives() {
+            let place = format!("mesh {} primitive {}", mesh.index(), primitive.index());
+            let builder = read_primitive(&primitive, &buffers, &place)?;
+            let builder = builder.transformed(&to_world);
+            parts.add(name, primitive.material().index(), builder);
+        }
+    }
+    let parts = parts.finish(|index| {
+        let material = document.materials().nth(index)?;
+        Some(read_material(&document, &material, &buffers, path))
+    });
+    Ok(LoadedFile {
+        parts,
+        warnings: Vec::new(),
+    })
+}
+
+fn malformed(what: &str, problem: impl Into<String>) -> LoadMeshErrorKind {
+    LoadMeshErrorKind::Malformed {
+        what: what.to_owned(),
+        problem: problem.into(),
+    }
+}
+
+/// The crate trusts the length in the header not to be less than the header itself.
+fn check_glb_header(bytes: &[u8]) -> Result<(), LoadMeshErrorKind> {
+    if !bytes.starts_with(b"glTF") {
+        return Ok(());
+    }
+    let length = bytes
+        .get(8..12)
+        .and_then(|b| b.try_into().ok())
+        .map(u32::from_le_bytes);
+    match length {
+        Some(length) if length >= 12 && length as usize <= bytes.len() => Ok(()),
+        Some(length) => Err(malformed(
+            "GLB header",
+            format!(
+                "it promises {length} bytes, but the file has {}; is it cut off?",
+                bytes.len()
+            ),
+        )),
+        None => Err(malformed("GLB header", "the file ends inside it")),
+    }
+}
+
+/// The bytes of every buffer, each at least as long as the document says.
+fn read_buffers(gltf: &Gltf, path: &Path) -> Result<Vec<Vec<u8>>, LoadMeshErrorKind> {
+    gltf.buffers()
+        .map(|buffer| {
+            let what = format!("buffer {}", buffer.index());
+            let data = match buffer.source() {
+                crate_gltf::buffer::Source::Bin => gltf
+                    .blob
+                    .clone()
+                    .ok_or_else(|| malformed(&what, "the GLB has no binary chunk"))?,
+                crate_gltf::buffer::Source::Uri(uri) => read_uri(uri, path, &what)?,
+            };
+            if data.len() < buffer.length() {
+                let found = data.len();
+                let wanted = buffer.length();
+                return Err(malformed(
+                    &what,
+                    format!("{found} bytes found, {wanted} expected"),
+                ));
+            }
+            Ok(data)
+        })
+        .collect()
+}
+
+fn read_uri(uri: &str, path: &Path, what: &str) -> Result<Vec<u8>, LoadMeshErrorKind> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        return data
+            .split_once(";base64,")
+            .and_then(|(_, text)| base64(text))
+            .ok_or_else(|| malformed(what, "its data URI is not valid base64"));
+    }
+    let file = beside(path, &percent_decoded(uri));
+    std::fs::read(&file).map_err(|source| LoadMeshErrorKind::Read {
+        what: format!("{what}, {}", file.display()),
+        source,
+    })
+}
+
+/// RFC 4648, with or without padding.
+fn base64(text: &str) -> Option<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
+    let (mut bits, mut held) = (0_u32, 0);
+    for c in text.trim_end_matches('=').bytes() {
+        let value = match c {
+            b'A'..=b'Z' => c - b'A',
+            b'a'..=b'z' => c - b'a' + 26,
+            b'0'..=b'9' => c - b'0' + 52,
+            b'+' => 62,
+            b'/' => 63,
+            _ => return None,
+        };
+        bits = bits << 6 | u32::from(value);
+        held += 6;
+        if held >= 8 {
+            held -= 8;
+            bytes.push((bits >> held) as u8);
+        }
+    }
+    Some(bytes)
+}
+
+fn percent_decoded(uri: &str) -> String {
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let [first, tail @ ..] = rest {
+        let hex = (*first == b'%')
+            .then(|| tail.first_chunk::<2>())
+            .flatten()
+            .and_then(|pair| std::str::from_utf8(pair).ok())
+            .and_then(|pair| u8::from_str_radix(pair, 16).ok());
+        bytes.push(hex.unwrap_or(*first));
+        rest = &tail[if hex.is_some() { 2 } else { 0 }..];
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// The triangles of a primitive in its own space; none for points and lines.
+fn read_primitive(
+    primitive: &Primitive,
+    buffers: &[Vec<u8>],
+    place: &str,
+) -> Result<MeshBuilder, LoadMeshErrorKind> {
+    if !matches!(
+        primitive.mode(),
+        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+    ) {
+        return Ok(MeshBuilder::default());
+    }
+    let floats = [DataType::F32];
+    let attributes = [
+        (Semantic::Positions, Dimensions::Vec3, &floats[..]),
+        (Semantic::Normals, Dimensions::Vec3, &floats[..]),
+        (
+            Semantic::TexCoords(0),
+            Dimensions::Vec2,
+            &[DataType::F32, DataType::U8, DataType::U16][..],
+        ),
+    ];
+    for (semantic, dimensions, types) in attributes {
+        if let Some(accessor) = primitive.get(&semantic) {
+            let what = format!("{place} {}", semantic.to_string());
+            check_accessor(&accessor, buffers, dimensions, types, &what)?;
+        }
+    }
+    if let Some(accessor) = primitive.indices() {
+        let types = [DataType::U8, DataType::U16, DataType::U32];
+        let what = format!("{place} indices");
+        check_accessor(&accessor, buffers, Dimensions::Scalar, &types, &what)?;
+    }
+    let reader = primitive.reader(|b| buffers.get(b.index()).map(Vec::as_slice));
+    let positions: Vec<Vec3> = reader
+        .read_positions()
+        .ok_or_else(|| malformed(place, "it has no POSITION accessor"))?
+        .map(Vec3::from)
+        .collect();
+    let normals = reader.read_normals().into_iter().flatten();
+    let texcoords = reader.read_tex_coords(0).map(|t| t.into_f32());
+    let indices: Vec<u32> = match reader.read_indices() {
+        Some(indices) => indices.into_u32().collect(),
+        None => (0..positions.len() as u32).collect(),
+    };
+    check_indices(&indices, positions.len(), place)?;
+    Ok(MeshBuilder {
+        normals: normals.map(Vec3::from).collect(),
+        // glTF's v points down.
+        texcoords: texcoords
+            .into_iter()
+            .flatten()
+            .map(|[u, v]| Vec2::new(u, 1.0 - v))
+            .collect(),
+        triangles: triangles(primitive.mode(), &indices, place)?,
+        positions,
+    })
+}
+
+fn check_indices(indices: &[u32], vertices: usize, place: &str) -> Result<(), LoadMeshErrorKind> {
+    match indices.iter().find(|&&i| i as usize >= vertices) {
+        Some(&index) => Err(LoadMeshErrorKind::IndexOutOfRange {
+            place: place.to_owned(),
+            what: "vertex",
+            index: index.into(),
+            count: vertices,
+            counted: " (counted from 0)",
+        }),
+        None => Ok(()),
+    }
+}
+
+/// The triangles of a list, strip or fan, with the winding that the specification gives (section 3.7.2.1).
+fn triangles(mode: Mode, indices: &[u32], place: &str) -> Result<Vec<[u32; 3]>, LoadMeshErrorKind> {
+    let windows = indices.windows(3);
+    Ok(match mode {
+        Mode::TriangleStrip => windows
+            .enumerate()
+            .map(|(i, w)| [w[0], w[1 + i % 2], w[2 - i % 2]])
+            .collect(),
+        Mode::TriangleFan => super::fan(indices)
+            .map(|[first, a, b]| [a, b, first])
+            .collect(),
+        _ => {
+            let (list, rest) = indices.as_chunks();
+            if !rest.is_empty() {
+                let found = indices.len();
+                let problem = format!("{found} indices; a list of triangles needs a multiple of 3");
+                return Err(malformed(place, problem));
+            }
+            list.to_vec()
+        }
+    })
+}
+
+/// Whether the accessor is of an expected type and lies inside its buffer, so that the crate's reader may
+/// be let loose on it.
+fn check_accessor(
+    accessor: &Accessor,
+    buffers: &[Vec<u8>],
+    dimensions: Dimensions,
+    types: &[DataType],
+    what: &str,
+) -> Result<(), LoadMeshErrorKind> {
+    if accessor.dimensions() != dimensions || !types.contains(&accessor.data_type()) {
+        let (found, kind) = (accessor.data_type(), accessor.dimensions());
+        return Err(malformed(
+            what,
+            format!("found {kind:?} of {found:?}; expected {dimensions:?} of {types:?}"),
+        ));
+    }
+    if accessor.sparse().is_some() {
+        return Err(LoadMeshErrorKind::Unsupported {
+            what: format!("{what}: a sparse accessor"),
+        });
+    }
+    let inside = accessor.view().is_some_and(|view| {
+        let stride = view.stride().unwrap_or(accessor.size());
+        let used = accessor
+            .count()
+            .checked_sub(1)
+            .and_then(|last| last.checked_mul(stride))
+            .and_then(|n| n.checked_add(accessor.size()))
+            .and_then(|n| n.checked_add(accessor.offset()));
+        let view_end = view.offset().checked_add(view.length());
+        let buffer = buffers.get(view.buffer().index()).map_or(0, Vec::len);
+        stride >= accessor.size()
+            && used.is_some_and(|n| n <= view.length())
+            && view_end.is_some_and(|n| n <= buffer)
+    });
+    if !inside {
+        let count = accessor.count();
+        return Err(malformed(
+            what,
+            format!("its {count} elements do not lie inside the buffer"),
+        ));
+    }
+    Ok(())
+}
+
+fn read_material(
+    document: &Document,
+    material: &crate_gltf::Material,
+    buffers: &[Vec<u8>],
+    path: &Path,
+) -> FileMaterial {
+    let pbr = material.pbr_metallic_roughness();
+    let [r, g, b, _] = pbr.base_color_factor();
+    FileMaterial {
+        name: material.name().unwrap_or("").to_owned(),
+        base_color: Vec3::new(r, g, b),
+        base_color_texture: pbr.base_color_texture().and_then(|info| {
+            let image = info.texture().source().index();
+            read_image(document, image, buffers, path)
+        }),
+        metallic: Some(pbr.metallic_factor()),
+        roughness: Some(pbr.roughness_factor()),
+        displacement: None,
+    }
+}
+
+/// The picture, from the plain JSON: the crate's own accessor panics on an image without a source.
+fn read_image(
+    document: &Document,
+    image: usize,
+    buffers: &[Vec<u8>],
+    path: &Path,
+) -> Option<FileTexture> {
+    let image = document.as_json().images.get(image)?;
+    if let Some(uri) = &image.uri {
+        return match uri.strip_prefix("data:") {
+            Some(data) => Some(FileTexture::Embedded(base64(
+                data.split_once(";base64,")?.1,
+            )?)),
+            None => Some(FileTexture::Path(beside(path, &percent_decoded(uri)))),
+        };
+    }
+    let view = document.views().nth(image.buffer_view?.value())?;
+    let end = view.offset().checked_add(view.length())?;
+    let bytes = buffers
+        .get(view.buffer().index())?
+        .get(view.offset()..end)?;
+    Some(FileTexture::Embedded(bytes.to_vec()))
+}
