@@ -43,7 +43,9 @@ pub enum OutputError {
         source: io::Error,
     },
     /// The picture's size does not fit its pixels or the format.
-    #[error("cannot write {path}: {found} pixels were given for {width}x{height}, which must be at least 1x1")]
+    #[error(
+        "cannot write {path}: {found} pixels were given for {width}x{height}, which must be at least 1x1"
+    )]
     WrongSize {
         /// The file.
         path: PathBuf,
@@ -177,7 +179,10 @@ mod tests {
             file.write_all(&[0; 100_000])?;
             Err(io::Error::from(ErrorKind::StorageFull))
         };
-        assert!(matches!(write(&path, half), Err(OutputError::DiskFull { .. })));
+        assert!(matches!(
+            write(&path, half),
+            Err(OutputError::DiskFull { .. })
+        ));
         assert!(names(folder.path()).is_empty());
         fs::write(&path, b"old").unwrap();
         assert!(write(&path, half).is_err());
@@ -190,7 +195,10 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn an_error_that_shows_only_when_flushed_is_reported() {
-        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let full = fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.txt");
         let result = write(&path, |_| {
@@ -198,7 +206,10 @@ mod tests {
             writer.write_all(b"fits the buffer")?;
             writer.flush()
         });
-        assert!(matches!(result, Err(OutputError::DiskFull { .. })), "{result:?}");
+        assert!(
+            matches!(result, Err(OutputError::DiskFull { .. })),
+            "{result:?}"
+        );
     }
 
     #[test]
@@ -216,9 +227,17 @@ mod tests {
     #[test]
     fn folders_and_devices_are_not_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        for path in [folder.path(), Path::new("/dev/null"), Path::new("/"), Path::new("")] {
+        for path in [
+            folder.path(),
+            Path::new("/dev/null"),
+            Path::new("/"),
+            Path::new(""),
+        ] {
             let result = write(path, |_| Ok(()));
-            assert!(matches!(result, Err(OutputError::NotAFile { .. })), "{path:?}: {result:?}");
+            assert!(
+                matches!(result, Err(OutputError::NotAFile { .. })),
+                "{path:?}: {result:?}"
+            );
         }
     }
 
