@@ -123,7 +123,7 @@ fn read_uri(uri: &str, path: &Path, what: &str) -> Result<Vec<u8>, LoadMeshError
             .ok_or_else(|| malformed(what, "its data URI is not valid base64"));
     }
     let file = beside(path, &percent_decoded(uri));
-    std::fs::read(&file).map_err(|source| LoadMeshErrorKind::Read {
+    super::read_regular(&file).map_err(|source| LoadMeshErrorKind::Read {
         what: format!("{what}, {}", file.display()),
         source,
     })
@@ -552,6 +552,14 @@ mod tests {
         let error = load(&with("/nodes/0/children", json!([0]))).unwrap_err();
         assert!(error.to_string().contains("node 0"), "{error}");
         assert!(load(&with("/scenes/0/nodes", json!([0, 1]))).is_err());
+    }
+
+    #[test]
+    fn a_required_extension_is_refused() {
+        let mut document = document();
+        document["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+        let error = load(&document).unwrap_err();
+        assert!(error.to_string().contains("extension"), "{error}");
     }
 
     #[test]
