@@ -88,6 +88,15 @@ pub fn write(
     }
 }
 
+/// Fails now if [`write`] to this path would fail for its name, its folder or permissions.
+pub fn check(path: &Path) -> Result<(), OutputError> {
+    let (target, folder) = resolve(path)?;
+    match temporary_file(&target, &folder) {
+        Ok(_) => Ok(()), // dropped, and removed with that
+        Err(source) => Err(classify(path, &folder, source)),
+    }
+}
+
 /// The file that is meant, links followed, and its folder.
 fn resolve(path: &Path) -> Result<(PathBuf, PathBuf), OutputError> {
     let not_a_file = || OutputError::NotAFile {
