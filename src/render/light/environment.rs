@@ -108,7 +108,9 @@ mod tests {
         rotation: f32,
         f: impl Fn(usize, usize) -> Vec3,
     ) -> Environment {
-        let pixels = (0..width * height).map(|i| f(i % width, i / width)).collect();
+        let pixels = (0..width * height)
+            .map(|i| f(i % width, i / width))
+            .collect();
         let image = EnvironmentImage {
             width,
             height,
@@ -119,9 +121,15 @@ mod tests {
 
     #[test]
     fn directions_read_the_pixels_they_should() {
-        let light = picture(8, 4, |column, row| Vec3::new(column as f32, row as f32, 1.0));
+        let light = picture(8, 4, |column, row| {
+            Vec3::new(column as f32, row as f32, 1.0)
+        });
         // The middle of the picture looks along -Z, between columns 3 and 4 and rows 1 and 2.
-        assert!(light.radiance(Vec3::NEG_Z).abs_diff_eq(Vec3::new(3.5, 1.5, 1.0), 1e-4));
+        assert!(
+            light
+                .radiance(Vec3::NEG_Z)
+                .abs_diff_eq(Vec3::new(3.5, 1.5, 1.0), 1e-4)
+        );
         assert!((light.radiance(Vec3::X).x - 5.5).abs() < 1e-4);
         assert!(light.radiance(Vec3::Y).y < 1e-4);
         assert!((light.radiance(Vec3::NEG_Y).y - 3.0).abs() < 1e-4);
@@ -141,7 +149,11 @@ mod tests {
     #[test]
     fn one_bright_pixel_is_found_and_its_light_is_exact() {
         let light = picture(64, 32, |column, row| {
-            Vec3::splat(if (column, row) == (20, 9) { 1000.0 } else { 0.0 })
+            Vec3::splat(if (column, row) == (20, 9) {
+                1000.0
+            } else {
+                0.0
+            })
         });
         let n = 20_000;
         let mut power = 0.0;
