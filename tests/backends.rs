@@ -15,7 +15,7 @@ use std::sync::Arc;
 use common::scene::{prisms, random, rock_map, sphere};
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use prismarch::bvh::{BvhError, BvhTracer};
-use prismarch::prism::{PrismHit, Prisms};
+use prismarch::prism::PrismHit;
 use prismarch::ray::Ray;
 use prismarch::surface::BaseMesh;
 use prismarch::trace::{Hit, INVALID_ID, Object, Placement, Shape, Tracer, World};
