@@ -2,6 +2,7 @@
 # shellcheck shell=bash
 
 # The checkout, wherever the script was called from.
+# shellcheck disable=SC2034 # for the scripts that source this
 checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 
 say() { printf '==> %s\n' "$*" >&2; }
@@ -11,7 +12,7 @@ die() {
     exit 1
 }
 
-# as_root WHY COMMAND...: as root, by sudo when we are not; WHY goes into the message when neither works.
+# as_root WHY COMMAND...: as root, by sudo when we are not; WHY goes into the message when there is neither.
 as_root() {
     local why=$1
     shift
@@ -19,7 +20,7 @@ as_root() {
         "$@"
     elif command -v sudo >/dev/null; then
         # No terminal, no password prompt: fail at once instead of hanging an unattended run.
-        if [ -t 0 ]; then sudo "$@"; else sudo -n "$@"; fi || die "$why failed as root (sudo $1)"
+        if [ -t 0 ]; then sudo "$@"; else sudo -n "$@"; fi
     else
         die "$why needs root: run this as root, or install sudo"
     fi
@@ -33,8 +34,8 @@ need_packages() {
     done
     [ ${#missing[@]} -gt 0 ] || return 0
     say "installing ${missing[*]}"
-    # The package lists may be absent or stale on a fresh machine; an update that fails half-way is no reason
-    # to stop as long as the install works.
+    # A fresh machine has no package lists. An update that fails in part is no reason to stop while the
+    # install works.
     as_root "apt-get update" env DEBIAN_FRONTEND=noninteractive apt-get update -qq >&2 ||
         say "apt-get update had errors; trying with the package lists there are"
     as_root "installing ${missing[*]}" env DEBIAN_FRONTEND=noninteractive \

@@ -1,6 +1,11 @@
 //! prismarch ray traces displaced surfaces without tessellating them.
 
+#[cfg(feature = "bvh")]
+pub mod bvh;
+pub mod cli;
 pub mod demo;
+#[cfg(feature = "embree")]
+pub mod embree;
 pub mod image;
 pub mod prism;
 pub mod ray;

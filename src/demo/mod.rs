@@ -2,7 +2,24 @@
 //!
 //! Everything is procedural and seeded, so that the repository stays small and every run makes the same bytes.
 
+mod asteroid;
+mod cavity;
+mod chainmail;
+mod dragon;
+mod drape;
+#[cfg(test)]
+mod laws;
+mod noise;
+mod orb;
+mod paint;
+mod scatter;
+mod shape;
+mod stump;
+mod sweep;
+mod write;
+
 use crate::surface::MeshBuilder;
+pub use write::WriteDemoError;
 
 /// What a demo is made of, in memory.
 pub struct DemoFiles {
@@ -33,4 +50,12 @@ pub struct Demo {
     pub map_size: usize,
     /// Makes it with a map of the given size (smaller ones are for tests).
     pub make: fn(map_size: usize) -> DemoFiles,
+}
+
+/// The demos, in the order of `--list`.
+pub const DEMOS: &[Demo] = &[asteroid::DEMO, chainmail::DEMO, orb::DEMO, stump::DEMO, dragon::DEMO];
+
+/// The demo of that name.
+pub fn find(name: &str) -> Option<&'static Demo> {
+    DEMOS.iter().find(|d| d.name == name)
 }

@@ -43,7 +43,9 @@ pub enum OutputError {
         source: io::Error,
     },
     /// The picture's size does not fit its pixels or the format.
-    #[error("cannot write {path}: {found} pixels were given for {width}x{height}, which must be at least 1x1")]
+    #[error(
+        "cannot write {path}: {found} pixels were given for {width}x{height}, which must be at least 1x1"
+    )]
     WrongSize {
         /// The file.
         path: PathBuf,
@@ -83,6 +85,15 @@ pub fn write(
     match temporary.persist(&target) {
         Ok(_) => Ok(()),
         Err(error) => Err(failed(error.error)), // the temporary file inside the error is removed with it
+    }
+}
+
+/// Fails now if [`write`] to this path would fail for its name, its folder or permissions.
+pub fn check(path: &Path) -> Result<(), OutputError> {
+    let (target, folder) = resolve(path)?;
+    match temporary_file(&target, &folder) {
+        Ok(_) => Ok(()), // dropped, and removed with that
+        Err(source) => Err(classify(path, &folder, source)),
     }
 }
 
@@ -168,7 +179,10 @@ mod tests {
             file.write_all(&[0; 100_000])?;
             Err(io::Error::from(ErrorKind::StorageFull))
         };
-        assert!(matches!(write(&path, half), Err(OutputError::DiskFull { .. })));
+        assert!(matches!(
+            write(&path, half),
+            Err(OutputError::DiskFull { .. })
+        ));
         assert!(names(folder.path()).is_empty());
         fs::write(&path, b"old").unwrap();
         assert!(write(&path, half).is_err());
@@ -181,7 +195,10 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn an_error_that_shows_only_when_flushed_is_reported() {
-        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let full = fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.txt");
         let result = write(&path, |_| {
@@ -189,7 +206,10 @@ mod tests {
             writer.write_all(b"fits the buffer")?;
             writer.flush()
         });
-        assert!(matches!(result, Err(OutputError::DiskFull { .. })), "{result:?}");
+        assert!(
+            matches!(result, Err(OutputError::DiskFull { .. })),
+            "{result:?}"
+        );
     }
 
     #[test]
@@ -207,9 +227,17 @@ mod tests {
     #[test]
     fn folders_and_devices_are_not_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        for path in [folder.path(), Path::new("/dev/null"), Path::new("/"), Path::new("")] {
+        for path in [
+            folder.path(),
+            Path::new("/dev/null"),
+            Path::new("/"),
+            Path::new(""),
+        ] {
             let result = write(path, |_| Ok(()));
-            assert!(matches!(result, Err(OutputError::NotAFile { .. })), "{path:?}: {result:?}");
+            assert!(
+                matches!(result, Err(OutputError::NotAFile { .. })),
+                "{path:?}: {result:?}"
+            );
         }
     }
 

@@ -161,7 +161,10 @@ mod tests {
     #[test]
     fn a_missing_channel_lists_what_there_is() {
         let error = pick("depth", &["R", "G", "B"]).unwrap_err().to_string();
-        assert!(error.contains("depth") && error.contains("R, G, B"), "{error}");
+        assert!(
+            error.contains("depth") && error.contains("R, G, B"),
+            "{error}"
+        );
         assert!(matches!(
             pick("a", &["R", "G", "B"]),
             Err(ImageError::NoSuchChannel { .. })

@@ -47,14 +47,11 @@ impl ColorImage {
     /// Coordinates that are not finite read as 0.
     pub fn sample(&self, st: Vec2, wrap: Wrap) -> Vec3 {
         let st = if st.is_finite() { st } else { Vec2::ZERO };
-        let at = st * Vec2::new(self.width as f32, self.height as f32) - 0.5;
-        let floor = at.floor();
-        let f = at - floor;
-        let [x0, x1] = neighbours(floor.x, self.width, wrap);
-        let [y0, y1] = neighbours(floor.y, self.height, wrap);
-        let bottom = self.pixel(x0, y0).lerp(self.pixel(x1, y0), f.x);
-        let top = self.pixel(x0, y1).lerp(self.pixel(x1, y1), f.x);
-        bottom.lerp(top, f.y)
+        let ([x0, x1], fx) = cell(st.x, self.width, wrap);
+        let ([y0, y1], fy) = cell(st.y, self.height, wrap);
+        let bottom = self.pixel(x0, y0).lerp(self.pixel(x1, y0), fx);
+        let top = self.pixel(x0, y1).lerp(self.pixel(x1, y1), fx);
+        bottom.lerp(top, fy)
     }
 
     /// Linear RGB of the pixel in column `x` of row `y` from the bottom; both inside the picture.
@@ -77,21 +74,16 @@ impl ColorImage {
     }
 }
 
-/// The pixels at index `floor` and the next one, brought into 0..size.
-fn neighbours(floor: f32, size: usize, wrap: Wrap) -> [usize; 2] {
-    let size = size as i64;
-    let first = floor as i64; // saturates
-    [first, first.saturating_add(1)].map(|index| {
-        let inside = match wrap {
-            Wrap::Repeat => index.rem_euclid(size),
-            Wrap::Clamp => index.clamp(0, size - 1),
-            Wrap::Mirror => {
-                let turn = index.rem_euclid(2 * size);
-                turn.min(2 * size - 1 - turn)
-            }
-        };
-        inside as usize
-    })
+/// The two pixels that `s` lies between along a side of `size` pixels, and how far it is from the first.
+fn cell(s: f32, size: usize, wrap: Wrap) -> ([usize; 2], f32) {
+    let side = size as f64;
+    let (x, _) = wrap.fold(f64::from(s) * side - 0.5, side);
+    let first = (x as usize).min(size - 1);
+    let second = match wrap {
+        Wrap::Repeat => (first + 1) % size,
+        Wrap::Clamp | Wrap::Mirror => (first + 1).min(size - 1),
+    };
+    ([first, second], (x - first as f64) as f32)
 }
 
 /// Reads a colour picture. 8-bit sRGB pictures stay 8-bit, everything else becomes linear floats.
@@ -150,7 +142,14 @@ fn linear_image(
     height: usize,
     pixels: Vec<[f32; 3]>,
 ) -> Result<ColorImage, ImageError> {
-    check_pixels(path, width, height, &pixels, f32::is_finite, "colours must be finite")?;
+    check_pixels(
+        path,
+        width,
+        height,
+        &pixels,
+        f32::is_finite,
+        "colours must be finite",
+    )?;
     Ok(ColorImage {
         width,
         height,

@@ -95,7 +95,11 @@ impl ExrFile {
             .decompress_sequential(false, |_, block| canvas.put(&header, &block))
             .map_err(failed)?;
         if canvas.filled != width * height * wanted.len() {
-            return Err(ImageError::decode(&self.path, Format::Exr, "blocks of pixels are missing"));
+            return Err(ImageError::decode(
+                &self.path,
+                Format::Exr,
+                "blocks of pixels are missing",
+            ));
         }
         Ok(Planes {
             width,
@@ -109,7 +113,12 @@ impl ExrFile {
             return Err(self.unsupported(format!("deep data in channel {name}")));
         }
         // Subsampling anywhere in the layer shifts every line behind it in a block.
-        if let Some(odd) = header.channels.list.iter().find(|c| c.sampling != Vec2(1, 1)) {
+        if let Some(odd) = header
+            .channels
+            .list
+            .iter()
+            .find(|c| c.sampling != Vec2(1, 1))
+        {
             return Err(self.unsupported(format!("the subsampled channel {}", odd.name)));
         }
         match header.channels.list[channel].sample_type {
@@ -141,13 +150,19 @@ struct Canvas {
 impl Canvas {
     fn put(&mut self, header: &Header, block: &UncompressedBlock) -> exr::error::UnitResult {
         for line in block.lines(&header.channels) {
-            let Some(plane) = self.channels.iter().position(|&c| c == line.location.channel) else {
+            let Some(plane) = self
+                .channels
+                .iter()
+                .position(|&c| c == line.location.channel)
+            else {
                 continue;
             };
             let Vec2(x, y) = line.location.position;
             let count = line.location.sample_count;
             if x + count > self.width || y >= self.height {
-                return Err(exr::error::Error::Invalid("block outside of the picture".into()));
+                return Err(exr::error::Error::Invalid(
+                    "block outside of the picture".into(),
+                ));
             }
             let start = (self.height - 1 - y) * self.width + x;
             let row = &mut self.planes[plane][start..start + count];

@@ -33,7 +33,11 @@ fn read_texels(path: &Path, channel: &Channel) -> Result<(usize, usize, Texels),
         let chosen = channel::select(channel, &file.channels, path)?;
         let names = chosen.iter().map(|&i| file.channels[i].clone()).collect();
         let read = file.read(&chosen)?;
-        let chosen = Chosen { path, width: read.width, names };
+        let chosen = Chosen {
+            path,
+            width: read.width,
+            names,
+        };
         let heights = chosen.agreed(read.planes, floats_agree)?;
         return Ok((read.width, read.height, Texels::F32(heights)));
     }
@@ -42,7 +46,10 @@ fn read_texels(path: &Path, channel: &Channel) -> Result<(usize, usize, Texels),
     let chosen = Chosen {
         path,
         width: raster.width,
-        names: indices.iter().map(|&i| raster.channels[i].clone()).collect(),
+        names: indices
+            .iter()
+            .map(|&i| raster.channels[i].clone())
+            .collect(),
     };
     let texels = match &raster.samples {
         Samples::U8(s) => Texels::U8(chosen.agreed(planes(s, &raster, &indices), |a, b| a == b)?),

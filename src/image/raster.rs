@@ -80,7 +80,11 @@ pub(super) fn decode(
         Format::Hdr => decode_with(path, format, ImageFormat::Hdr, file),
         Format::Jpeg => decode_jpeg(path, file),
         Format::Tiff => tiff_file::decode(path, file),
-        Format::Exr => Err(ImageError::decode(path, format, "EXR has no interleaved samples")),
+        Format::Exr => Err(ImageError::decode(
+            path,
+            format,
+            "EXR has no interleaved samples",
+        )),
     }
 }
 
@@ -97,7 +101,11 @@ fn decode_jpeg(path: &Path, mut file: BufReader<File>) -> Result<Raster, ImageEr
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     // Coded data never holds the end marker, so one behind the last scan's start is the picture's own.
     if last(END_OF_IMAGE) <= last(START_OF_SCAN) {
-        return Err(ImageError::decode(path, Format::Jpeg, "the end of the file is missing"));
+        return Err(ImageError::decode(
+            path,
+            Format::Jpeg,
+            "the end of the file is missing",
+        ));
     }
     decode_with(path, Format::Jpeg, ImageFormat::Jpeg, Cursor::new(bytes))
 }
@@ -109,7 +117,9 @@ fn decode_with(
     reader: impl BufRead + Seek,
 ) -> Result<Raster, ImageError> {
     let failed = |error: image::ImageError| match error {
-        image::ImageError::IoError(source) if source.kind() != std::io::ErrorKind::UnexpectedEof => {
+        image::ImageError::IoError(source)
+            if source.kind() != std::io::ErrorKind::UnexpectedEof =>
+        {
             ImageError::Read {
                 path: path.to_owned(),
                 source,

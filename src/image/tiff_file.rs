@@ -11,7 +11,8 @@ use super::error::check_size;
 use super::raster::{Raster, Samples, channel_names};
 use super::{Format, ImageError, MAX_PIXELS};
 
-const EXPECTED: &str = "grey or RGB, with or without alpha, in 8- or 16-bit unsigned or float samples is expected";
+const EXPECTED: &str =
+    "grey or RGB, with or without alpha, in 8- or 16-bit unsigned or float samples is expected";
 
 /// Decodes the first picture of a TIFF file.
 pub(super) fn decode(path: &Path, file: BufReader<File>) -> Result<Raster, ImageError> {
@@ -103,7 +104,10 @@ mod tests {
 
     #[test]
     fn small_samples_fill_the_byte_range() {
-        assert_eq!(unpack(&[0b1010_0000, 0b0100_0000], 3, 1), [255, 0, 255, 0, 255, 0]);
+        assert_eq!(
+            unpack(&[0b1010_0000, 0b0100_0000], 3, 1),
+            [255, 0, 255, 0, 255, 0]
+        );
         assert_eq!(unpack(&[0b00_01_10_11], 4, 2), [0, 85, 170, 255]);
         assert_eq!(unpack(&[0x0f], 2, 4), [0, 255]);
     }

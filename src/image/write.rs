@@ -1,13 +1,13 @@
-//! Writing pictures. All rows are bottom first, as in memory; the files hold them top first, as their formats want.
+//! Writing pictures. Rows are bottom first, as in memory; files hold them top first, as their formats want.
 
 use std::io::{self, Write};
 use std::path::Path;
 
+use exr::meta::attribute::AttributeValue;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text,
     WritableImage,
 };
-use exr::meta::attribute::AttributeValue;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
@@ -20,19 +20,26 @@ pub fn write_png_rgb8(
     height: usize,
     pixels: &[[u8; 3]],
 ) -> Result<(), OutputError> {
-    let rows = flipped(path, width, height, pixels)?;
-    write_png(path, width, height, rows.as_flattened(), ExtendedColorType::Rgb8)
+    let pixels = top_first(path, width, height, pixels)?;
+    write_png(
+        path,
+        width,
+        height,
+        pixels.as_flattened(),
+        ExtendedColorType::Rgb8,
+    )
 }
 
-/// Writes a 16-bit grey PNG, bottom row first. Fast rather than small: maps of 8192x8192 take a few seconds.
+/// Writes a 16-bit grey PNG, bottom row first. Fast rather than small.
 pub fn write_png_gray16(
     path: &Path,
     width: usize,
     height: usize,
     heights: &[u16],
 ) -> Result<(), OutputError> {
-    let rows = flipped(path, width, height, heights)?;
-    write_png(path, width, height, bytemuck::cast_slice(&rows), ExtendedColorType::L16)
+    let heights = top_first(path, width, height, heights)?;
+    let bytes = bytemuck::cast_slice(&heights);
+    write_png(path, width, height, bytes, ExtendedColorType::L16)
 }
 
 fn write_png(
@@ -89,10 +96,10 @@ pub fn write_exr(
 ) -> Result<(), OutputError> {
     let mut list = Vec::with_capacity(channels.len());
     for channel in channels {
-        let rows = flipped(path, width, height, &channel.samples)?;
-        list.push(AnyChannel::new(text(path, &channel.name)?, FlatSamples::F32(rows)));
+        let samples = top_first(path, width, height, &channel.samples)?;
+        let name = text(path, &channel.name)?;
+        list.push(AnyChannel::new(name, FlatSamples::F32(samples)));
     }
-    list.sort_by(|a, b| a.name.cmp(&b.name));
     let mut header = LayerAttributes::default();
     for (name, value) in attributes {
         header
@@ -102,8 +109,8 @@ pub fn write_exr(
     let layer = Layer::new(
         (width, height),
         header,
-        Encoding::SMALL_FAST_LOSSLESS,
-        AnyChannels { list: list.into() },
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(list.into()),
     );
     let picture = Image::from_layer(layer);
     atomic::write(path, |file| {
@@ -126,8 +133,8 @@ fn text(path: &Path, value: &str) -> Result<Text, OutputError> {
     })
 }
 
-/// Rows in the opposite order, when there are as many pixels as the size says.
-fn flipped<T: Copy>(
+/// The pixels as files want them, when there are as many as the size says.
+fn top_first<T: Copy>(
     path: &Path,
     width: usize,
     height: usize,
@@ -141,11 +148,11 @@ fn flipped<T: Copy>(
             found: pixels.len(),
         });
     }
-    let mut rows = Vec::with_capacity(pixels.len());
+    let mut flipped = Vec::with_capacity(pixels.len());
     for row in pixels.chunks_exact(width).rev() {
-        rows.extend_from_slice(row);
+        flipped.extend_from_slice(row);
     }
-    Ok(rows)
+    Ok(flipped)
 }
 
 #[cfg(test)]

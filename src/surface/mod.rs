@@ -13,6 +13,7 @@
 mod displaced;
 mod map;
 mod mesh;
+mod normals;
 mod patch;
 mod uv;
 

@@ -1,0 +1,252 @@
+//! Base meshes from charts: grids of quads, each with its own rectangle of the map.
+//!
+//! A chart whose rectangle comes from [`Rect::atlas_cell`] has its border on texel centres. Two charts with
+//! as many texels along a shared border then interpolate the same numbers there: no crack, not even by rounding.
+
+use std::collections::HashMap;
+
+use glam::{Vec2, Vec3};
+
+use crate::surface::MeshBuilder;
+
+/// A rectangle in texture space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rect {
+    /// Lower left corner.
+    pub min: Vec2,
+    /// Upper right corner.
+    pub max: Vec2,
+}
+
+impl Rect {
+    /// The whole map.
+    pub const FULL: Self = Self {
+        min: Vec2::ZERO,
+        max: Vec2::ONE,
+    };
+
+    /// Cell `index` (row by row from the bottom) of a map cut into `per_side` x `per_side` cells, less
+    /// `gutter` texels on every side; the border runs through the centres of the first texels kept.
+    ///
+    /// `map_size` is a multiple of `per_side`, and a cell is wider than two gutters.
+    pub fn atlas_cell(index: usize, per_side: usize, map_size: usize, gutter: usize) -> Self {
+        let cell = map_size / per_side;
+        let corner = Vec2::new((index % per_side) as f32, (index / per_side) as f32) * cell as f32;
+        let inset = gutter as f32 + 0.5;
+        Self {
+            min: (corner + inset) / map_size as f32,
+            max: (corner + (cell as f32 - inset)) / map_size as f32,
+        }
+    }
+
+    /// The whole map with its border on the outermost texels' centres.
+    pub fn texel_centres(map_size: usize) -> Self {
+        Self::atlas_cell(0, 1, map_size, 0)
+    }
+
+    /// From [0, 1]^2 to texture space.
+    pub fn place(&self, uv: Vec2) -> Vec2 {
+        self.min + uv * (self.max - self.min)
+    }
+
+    /// From texture space to [0, 1]^2, and beyond it outside.
+    pub fn local(&self, st: Vec2) -> Vec2 {
+        (st - self.min) / (self.max - self.min)
+    }
+}
+
+/// A grid of quads within a mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct Chart {
+    /// Quads along u.
+    pub nu: usize,
+    /// Quads along v.
+    pub nv: usize,
+    /// Its place in the map.
+    pub rect: Rect,
+    first: usize,
+}
+
+/// A point of the base surface.
+#[derive(Clone, Copy, Debug)]
+pub struct BasePoint {
+    /// P(b), on the flat base triangle.
+    pub position: Vec3,
+    /// N'(b), unit.
+    pub normal: Vec3,
+}
+
+/// Adds a grid of `nu` x `nv` quads, 2 triangles each, with `position` at (u, v) in [0, 1]^2.
+///
+/// Outside is where u x v points. Normals are left to [`smooth_normals`].
+pub fn add_grid(
+    mesh: &mut MeshBuilder,
+    (nu, nv): (usize, usize),
+    rect: Rect,
+    position: impl Fn(Vec2) -> Vec3,
+) -> Chart {
+    let first = mesh.positions.len();
+    for j in 0..=nv {
+        for i in 0..=nu {
+            let uv = Vec2::new(i as f32 / nu as f32, j as f32 / nv as f32);
+            mesh.positions.push(position(uv));
+            mesh.texcoords.push(rect.place(uv));
+        }
+    }
+    let chart = Chart {
+        nu,
+        nv,
+        rect,
+        first,
+    };
+    for j in 0..nv {
+        for i in 0..nu {
+            let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+                .map(|(i, j)| chart.vertex(i, j) as u32);
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    chart
+}
+
+/// Adds a tube of `sides` x (`path.len()` - 1) quads: u runs around it, v along the path.
+///
+/// `radius` is given the fraction of the path in [0, 1] and the angle in [0, 2 pi). Frames are carried along without
+/// twist; the first and the last column have the same positions bit for bit. The path has at least two
+/// points, no two neighbours equal.
+pub fn add_tube(
+    mesh: &mut MeshBuilder,
+    path: &[Vec3],
+    sides: usize,
+    rect: Rect,
+    radius: impl Fn(f32, f32) -> f32,
+) -> Chart {
+    let frames = frames_along(path);
+    let last = path.len() - 1;
+    add_grid(mesh, (sides, last), rect, |uv| {
+        let row = (uv.y * last as f32).round() as usize;
+        let side = (uv.x * sides as f32).round() as usize % sides;
+        let angle = std::f32::consts::TAU * side as f32 / sides as f32;
+        let (right, up) = frames[row];
+        path[row] + radius(uv.y, angle) * (right * angle.cos() + up * angle.sin())
+    })
+}
+
+/// (right, up) across each point of a path, carried along by the smallest rotation; right x up is forward.
+pub fn frames_along(path: &[Vec3]) -> Vec<(Vec3, Vec3)> {
+    let last = path.len() - 1;
+    let forward = |i: usize| (path[(i + 1).min(last)] - path[i.saturating_sub(1)]).normalize();
+    let mut right = forward(0).any_orthonormal_vector();
+    (0..=last)
+        .map(|i| {
+            let f = forward(i);
+            right = right.reject_from_normalized(f).normalize();
+            (right, f.cross(right))
+        })
+        .collect()
+}
+
+impl Chart {
+    /// Index in the mesh of grid vertex (i, j).
+    pub fn vertex(&self, i: usize, j: usize) -> usize {
+        self.first + j * (self.nu + 1) + i
+    }
+
+    /// P and N' at texture coordinates `st`: exactly the surface that is displaced there. Outside the
+    /// chart the nearest triangle goes on in its plane, which is what gutters are filled with.
+    pub fn base_point(&self, mesh: &MeshBuilder, st: Vec2) -> BasePoint {
+        let uv = self.rect.local(st) * Vec2::new(self.nu as f32, self.nv as f32);
+        let i = (uv.x.max(0.0) as usize).min(self.nu - 1);
+        let j = (uv.y.max(0.0) as usize).min(self.nv - 1);
+        let (x, y) = (uv.x - i as f32, uv.y - j as f32);
+        let (a, c) = (self.vertex(i, j), self.vertex(i + 1, j + 1));
+        // The quad's third corner, and the barycentric coordinates of (a, third, c).
+        let (third, b) = if x >= y {
+            (self.vertex(i + 1, j), [1.0 - x, x - y, y])
+        } else {
+            (self.vertex(i, j + 1), [1.0 - y, y - x, x])
+        };
+        let blend = |of: &[Vec3]| b[0] * of[a] + b[1] * of[third] + b[2] * of[c];
+        BasePoint {
+            position: blend(&mesh.positions),
+            normal: blend(&mesh.normals).normalize_or(Vec3::Y),
+        }
+    }
+}
+
+/// Sets every normal to the angle-weighted mean of the faces around it. Vertices at the same position (bit
+/// for bit, -0 being 0) share one normal, whichever chart they belong to.
+pub fn smooth_normals(mesh: &mut MeshBuilder) {
+    let mut sums: HashMap<[u32; 3], Vec3> = HashMap::new();
+    for triangle in &mesh.triangles {
+        let p = triangle.map(|i| mesh.positions[i as usize]);
+        let face = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+        for k in 0..3 {
+            let angle = (p[(k + 1) % 3] - p[k]).angle_between(p[(k + 2) % 3] - p[k]);
+            *sums.entry(position_key(p[k])).or_default() += angle * face;
+        }
+    }
+    mesh.normals = mesh
+        .positions
+        .iter()
+        .map(|&p| sums.get(&position_key(p)).copied().unwrap_or(Vec3::Y))
+        .map(|n| n.normalize_or(Vec3::Y))
+        .collect();
+}
+
+/// The bits of a position; adding zero turns -0 into 0.
+pub fn position_key(p: Vec3) -> [u32; 3] {
+    (p + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tube_is_closed_round_and_faces_outward() {
+        let path: Vec<Vec3> = (0..9)
+            .map(|i| Vec3::new(0.3 * i as f32, (0.5 * i as f32).sin(), 0.1 * i as f32))
+            .collect();
+        let mut mesh = MeshBuilder::default();
+        let chart = add_tube(&mut mesh, &path, 12, Rect::FULL, |_, _| 0.2);
+        smooth_normals(&mut mesh);
+        assert_eq!(mesh.triangles.len(), 2 * 12 * 8);
+        for j in 0..=8 {
+            let (a, b) = (chart.vertex(0, j), chart.vertex(12, j));
+            assert_eq!(mesh.positions[a], mesh.positions[b]);
+            assert_eq!(mesh.normals[a], mesh.normals[b]);
+            for i in 0..=12 {
+                let out = mesh.positions[chart.vertex(i, j)] - path[j];
+                assert!((out.length() - 0.2).abs() < 1e-5);
+                assert!(out.dot(mesh.normals[chart.vertex(i, j)]) > 0.1);
+            }
+        }
+    }
+
+    #[test]
+    fn base_points_lie_on_the_triangles() {
+        let mut mesh = MeshBuilder::default();
+        let rect = Rect::atlas_cell(5, 4, 256, 3);
+        let chart = add_grid(&mut mesh, (3, 2), rect, |uv| {
+            Vec3::new(uv.x, uv.y, (5.0 * uv.x * uv.y).sin())
+        });
+        smooth_normals(&mut mesh);
+        for t in &mesh.triangles {
+            let corner = t.map(|i| mesh.positions[i as usize]);
+            let st = t.map(|i| mesh.texcoords[i as usize]);
+            let b = [0.2, 0.5, 0.3];
+            let expected = b[0] * corner[0] + b[1] * corner[1] + b[2] * corner[2];
+            let asked = b[0] * st[0] + b[1] * st[1] + b[2] * st[2];
+            let found = chart.base_point(&mesh, asked).position;
+            assert!(found.distance(expected) < 1e-4);
+        }
+    }
+
+    #[test]
+    fn atlas_cells_have_their_border_on_texel_centres() {
+        let rect = Rect::atlas_cell(9, 8, 512, 2);
+        assert_eq!(512.0 * rect.min, Vec2::new(66.5, 66.5));
+        assert_eq!(512.0 * rect.max, Vec2::new(125.5, 125.5));
+    }
+}
