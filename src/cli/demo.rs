@@ -73,7 +73,9 @@ fn find(name: &str) -> Result<&'static Demo, CliError> {
     crate::demo::find(name).ok_or_else(|| {
         let names: Vec<_> = DEMOS.iter().map(|demo| demo.name).collect();
         let names = names.join(", ");
-        CliError::Usage(format!("there is no demo {name:?}; expected one of {names}"))
+        CliError::Usage(format!(
+            "there is no demo {name:?}; expected one of {names}"
+        ))
     })
 }
 

@@ -124,6 +124,7 @@ fn first_root<L: Lanes>(prisms: &Prisms, prim: u32, ray: &Ray) -> Option<Root> {
         step,
         speed: ray.direction.length(),
         first,
+        limit: (ray.tfar - path.t0) / path.dt,
     };
     inside.intervals().iter().find_map(|&interval| {
         field.march::<L, Root>(interval, &stepping, |crossing| {

@@ -65,6 +65,8 @@ const SIDE_EPSILON: f32 = 1e-4;
 
 impl Path {
     /// The part of `ray` that may be inside the prism; `None` when it misses the slabs around it.
+    ///
+    /// It is not cut at tfar: samples would move with it, and a hit with what else the ray has met before.
     #[inline(always)]
     pub fn clip(prism: &Prism, field: &HeightField, ray: &Ray) -> Option<Clipped> {
         let origin = prism.point(ray.origin);
@@ -84,9 +86,9 @@ impl Path {
         );
         let (t0, t1) = (
             a.min(b).max_element().max(ray.tnear),
-            a.max(b).min_element().min(ray.tfar),
+            a.max(b).min_element(),
         );
-        (t0 < t1).then_some(Clipped {
+        (t0 < t1 && t0 < ray.tfar).then_some(Clipped {
             origin,
             direction,
             normals,

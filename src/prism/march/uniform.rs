@@ -35,6 +35,8 @@ pub struct Stepping {
     pub speed: f32,
     /// R, in (0, 1].
     pub first: f32,
+    /// No sample is needed well beyond this parameter of the path.
+    pub limit: f32,
 }
 
 /// Heights above the surface at eight parameters.
@@ -64,7 +66,10 @@ impl Field<'_> {
         };
         let mut before: Option<(f32, bool)> = None;
         let mut k = 0.0;
-        while k <= last {
+        // Polishing may end up to a step before the bracket.
+        let wanted =
+            |before: Option<(f32, bool)>| before.is_none_or(|(s, _)| s - step <= stepping.limit);
+        while k <= last && wanted(before) {
             let s = (lane_numbers::<L>() + L::splat(k - 1.0 + stepping.first))
                 .mul_add(L::splat(step), L::splat(from))
                 .max(L::splat(from))

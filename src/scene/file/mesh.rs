@@ -77,11 +77,14 @@ impl MeshTable {
             mask: section
                 .optional("mask", |i| i.integer(0..=u32::MAX))?
                 .unwrap_or(u32::MAX),
-            transform: section.optional("transform", transform)?.unwrap_or_default(),
-            instances: section.optional("instances", instances)?.unwrap_or_default(),
-            displacement: section.optional("displacement", |i| {
-                DisplacementTable::read(i, folder)
-            })?,
+            transform: section
+                .optional("transform", transform)?
+                .unwrap_or_default(),
+            instances: section
+                .optional("instances", instances)?
+                .unwrap_or_default(),
+            displacement: section
+                .optional("displacement", |i| DisplacementTable::read(i, folder))?,
         })
     }
 }
