@@ -18,8 +18,7 @@ pub fn to_srgb8(radiance: Vec3, exposure: f32, curve: ToneCurve) -> [u8; 3] {
 
 /// A linear value through `curve`: 0 stays 0, increasing, at most 1.
 pub fn tone_map(x: f32, curve: ToneCurve) -> f32 {
-    // f32::max returns the other operand for NaN.
-    let x = x.max(0.0).min(WHITE);
+    let x = if x.is_nan() { 0.0 } else { x.clamp(0.0, WHITE) };
     match curve {
         ToneCurve::Filmic => filmic(x),
         ToneCurve::Standard => x.min(1.0),
