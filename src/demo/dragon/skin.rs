@@ -175,7 +175,7 @@ fn ends(t: f32) -> f32 {
 fn trim(trim: Trim, t: f32) -> f32 {
     match trim {
         Trim::Horn => {
-            0.14 + 0.13 * (TAU * 13.0 * t).sin() * smoothstep(0.95, 0.6, t)
+            0.12 + 0.07 * (TAU * 13.0 * t).sin() * smoothstep(0.95, 0.6, t)
         }
         Trim::Spine => 0.08 + 0.05 * (TAU * 7.0 * t).cos() * smoothstep(0.9, 0.5, t),
         Trim::Whisker => 0.05 + 0.03 * (TAU * 24.0 * t).sin(),
