@@ -1,9 +1,15 @@
 //! prismarch ray traces displaced surfaces without tessellating them.
 
+#[cfg(feature = "bvh")]
+pub mod bvh;
+pub mod cli;
 pub mod demo;
+#[cfg(feature = "embree")]
+pub mod embree;
 pub mod image;
 pub mod prism;
 pub mod ray;
+pub mod render;
 pub mod scene;
 pub mod surface;
 pub mod trace;

@@ -2,18 +2,24 @@
 //!
 //! Everything is procedural and seeded, so that the repository stays small and every run makes the same bytes.
 
+mod asteroid;
 mod cavity;
+mod chainmail;
+mod dragon;
+mod drape;
 #[cfg(test)]
 mod laws;
-mod dragon;
 mod noise;
 mod orb;
 mod paint;
+mod scatter;
 mod shape;
 mod stump;
 mod sweep;
+mod write;
 
 use crate::surface::MeshBuilder;
+pub use write::WriteDemoError;
 
 /// What a demo is made of, in memory.
 pub struct DemoFiles {
@@ -47,7 +53,7 @@ pub struct Demo {
 }
 
 /// The demos, in the order of `--list`.
-pub const DEMOS: &[Demo] = &[orb::DEMO, stump::DEMO, dragon::DEMO];
+pub const DEMOS: &[Demo] = &[asteroid::DEMO, chainmail::DEMO, orb::DEMO, stump::DEMO, dragon::DEMO];
 
 /// The demo of that name.
 pub fn find(name: &str) -> Option<&'static Demo> {

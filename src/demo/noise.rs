@@ -59,21 +59,39 @@ fn dot_gradient3(h: u32, d: Vec3) -> f32 {
     (if h & 1 == 0 { u } else { -u }) + (if h & 2 == 0 { v } else { -v })
 }
 
+/// The lattice cell of a coordinate below 2^31, and the place in it. Cheaper than `floor` where the baseline
+/// instruction set has none.
+fn split(x: f32) -> (i32, f32) {
+    let truncated = x as i32;
+    let cell = truncated - i32::from((truncated as f32) > x);
+    (cell, x - cell as f32)
+}
+
 /// Gradient noise in the plane, about [-1, 1], zero at lattice points.
 pub fn gradient2(seed: u32, p: Vec2) -> f32 {
-    gradient3(seed, p.extend(0.5))
+    let ((x, fx), (y, fy)) = (split(p.x), split(p.y));
+    let corner = |i: i32, j: i32| {
+        let h = hash(seed, x + i, y + j, 0);
+        let (dx, dy) = (fx - i as f32, fy - j as f32);
+        // Eight directions: (+-1, +-1/2) and (+-1/2, +-1).
+        let (a, b) = if h >> 31 == 0 { (dx, dy) } else { (dy, dx) };
+        let a = if h & 1 == 0 { a } else { -a };
+        let b = if h & 2 == 0 { b } else { -b };
+        a + 0.5 * b
+    };
+    let u = fade(fx);
+    let edge = |j| mix(corner(0, j), corner(1, j), u);
+    mix(edge(0), edge(1), fade(fy))
 }
 
 /// Gradient noise in space, about [-1, 1], zero at lattice points.
 pub fn gradient3(seed: u32, p: Vec3) -> f32 {
-    let cell = p.floor();
-    let f = p - cell;
-    let (x, y, z) = (cell.x as i32, cell.y as i32, cell.z as i32);
+    let ((x, fx), (y, fy), (z, fz)) = (split(p.x), split(p.y), split(p.z));
     let corner = |i: i32, j: i32, k: i32| {
-        let offset = Vec3::new(i as f32, j as f32, k as f32);
-        dot_gradient3(hash(seed, x + i, y + j, z + k), f - offset)
+        let to_point = Vec3::new(fx - i as f32, fy - j as f32, fz - k as f32);
+        dot_gradient3(hash(seed, x + i, y + j, z + k), to_point)
     };
-    let (u, v, w) = (fade(f.x), fade(f.y), fade(f.z));
+    let (u, v, w) = (fade(fx), fade(fy), fade(fz));
     let edge = |j, k| mix(corner(0, j, k), corner(1, j, k), u);
     let face = |k| mix(edge(0, k), edge(1, k), v);
     mix(face(0), face(1), w)
@@ -81,12 +99,10 @@ pub fn gradient3(seed: u32, p: Vec3) -> f32 {
 
 /// Value noise in the plane, [0, 1): softer and blotchier than gradient noise, half its price.
 pub fn value2(seed: u32, p: Vec2) -> f32 {
-    let cell = p.floor();
-    let f = p - cell;
-    let (x, y) = (cell.x as i32, cell.y as i32);
+    let ((x, fx), (y, fy)) = (split(p.x), split(p.y));
     let corner = |i: i32, j: i32| unit(hash(seed, x + i, y + j, 0));
-    let edge = |j| mix(corner(0, j), corner(1, j), fade(f.x));
-    mix(edge(0), edge(1), fade(f.y))
+    let edge = |j| mix(corner(0, j), corner(1, j), fade(fx));
+    mix(edge(0), edge(1), fade(fy))
 }
 
 /// Octaves of a noise: each next one at twice the frequency and `gain` times the amplitude.
@@ -104,38 +120,45 @@ impl Octaves {
         Self { count, gain: 0.5 }
     }
 
-    /// Sum of the octaves over the sum of their amplitudes.
-    fn sum(self, seed: u32, p: Vec3, basis: impl Fn(f32) -> f32) -> f32 {
-        let (mut total, mut norm, mut amplitude, mut q) = (0.0, 0.0, 1.0, p);
-        for octave in 0..self.count {
-            total += amplitude * basis(gradient3(seed.wrapping_add(octave), q));
+    /// Sum of the octaves over the sum of their amplitudes; `octave` is given the octave's index and frequency.
+    fn sum(self, octave: impl Fn(u32, f32) -> f32) -> f32 {
+        let (mut total, mut norm, mut amplitude, mut frequency) = (0.0, 0.0, 1.0, 1.0);
+        for index in 0..self.count {
+            total += amplitude * octave(index, frequency);
             norm += amplitude;
             amplitude *= self.gain;
-            // The shift keeps the zeros of the octaves' lattices apart.
-            q = 2.0 * q + Vec3::splat(0.37);
+            frequency *= 2.0;
         }
         total / norm
     }
 }
 
+/// Keeps the zeros of the octaves' lattices apart.
+const SHIFT: f32 = 0.37;
+
+/// Crests where the noise changes its sign.
+fn crest(n: f32) -> f32 {
+    (1.0 - n.abs()).max(0.0).powi(2)
+}
+
 /// Fractal gradient noise in space, about [-1, 1].
 pub fn fbm3(seed: u32, p: Vec3, octaves: Octaves) -> f32 {
-    octaves.sum(seed, p, |n| n)
+    octaves.sum(|i, f| gradient3(seed.wrapping_add(i), f * p + SHIFT * i as f32))
 }
 
 /// Fractal gradient noise in the plane, about [-1, 1].
 pub fn fbm2(seed: u32, p: Vec2, octaves: Octaves) -> f32 {
-    fbm3(seed, p.extend(0.5), octaves)
+    octaves.sum(|i, f| gradient2(seed.wrapping_add(i), f * p + SHIFT * i as f32))
 }
 
 /// Ridged fractal noise in space, [0, 1]: sharp crests at 1, round valleys.
 pub fn ridged3(seed: u32, p: Vec3, octaves: Octaves) -> f32 {
-    octaves.sum(seed, p, |n| (1.0 - n.abs()).max(0.0).powi(2))
+    octaves.sum(|i, f| crest(gradient3(seed.wrapping_add(i), f * p + SHIFT * i as f32)))
 }
 
 /// Ridged fractal noise in the plane, [0, 1].
 pub fn ridged2(seed: u32, p: Vec2, octaves: Octaves) -> f32 {
-    ridged3(seed, p.extend(0.5), octaves)
+    octaves.sum(|i, f| crest(gradient2(seed.wrapping_add(i), f * p + SHIFT * i as f32)))
 }
 
 /// What cellular noise knows of a point. Feature points are jittered, one in each unit cell.
@@ -153,14 +176,15 @@ pub struct Cellular<V> {
 
 /// Cellular noise in space.
 pub fn cellular3(seed: u32, p: Vec3) -> Cellular<Vec3> {
-    let cell = p.floor();
+    let ((x, fx), (y, fy), (z, fz)) = (split(p.x), split(p.y), split(p.z));
+    let within = Vec3::new(fx, fy, fz);
     let mut found = Nearest::default();
     for k in -1..=1 {
         for j in -1..=1 {
             for i in -1..=1 {
-                let c = cell + Vec3::new(i as f32, j as f32, k as f32);
-                let id = hash(seed, c.x as i32, c.y as i32, c.z as i32);
-                let offset = p - c - bytes_as_units(id);
+                let id = hash(seed, x + i, y + j, z + k);
+                let cell = Vec3::new(i as f32, j as f32, k as f32);
+                let offset = within - cell - pieces(id);
                 found.consider(offset.length_squared(), id, offset);
             }
         }
@@ -170,13 +194,14 @@ pub fn cellular3(seed: u32, p: Vec3) -> Cellular<Vec3> {
 
 /// Cellular noise in the plane.
 pub fn cellular2(seed: u32, p: Vec2) -> Cellular<Vec2> {
-    let cell = p.floor();
+    let ((x, fx), (y, fy)) = (split(p.x), split(p.y));
+    let within = Vec2::new(fx, fy);
     let mut found = Nearest::default();
     for j in -1..=1 {
         for i in -1..=1 {
-            let c = cell + Vec2::new(i as f32, j as f32);
-            let id = hash(seed, c.x as i32, c.y as i32, 0);
-            let offset = p - c - bytes_as_units(id).truncate();
+            let id = hash(seed, x + i, y + j, 0);
+            let cell = Vec2::new(i as f32, j as f32);
+            let offset = within - cell - pieces(id).truncate();
             found.consider(offset.length_squared(), id, offset);
         }
     }
@@ -184,7 +209,7 @@ pub fn cellular2(seed: u32, p: Vec2) -> Cellular<Vec2> {
 }
 
 /// Three ten-bit pieces of a hash as numbers in [0, 1).
-fn bytes_as_units(h: u32) -> Vec3 {
+fn pieces(h: u32) -> Vec3 {
     Vec3::new(
         (h & 1023) as f32,
         ((h >> 10) & 1023) as f32,

@@ -1,34 +1,36 @@
 //! Reading and writing pictures. Heights keep their precision; files appear by rename when complete.
+//!
+//! Pictures are read by content, not by the file's name: PNG, JPEG, TIFF, OpenEXR, Radiance HDR. A picture in memory is
+//! bottom row first (v points up) except for the environment, whose first row is the zenith.
+//!
+//! A file is refused from its header alone when it claims more than [`MAX_PIXELS`]: no memory is taken on the
+//! word of a few bytes.
 
-use glam::Vec3;
+pub mod atomic;
+mod channel;
+mod color;
+mod environment;
+mod error;
+mod exr_file;
+mod format;
+mod heights;
+mod raster;
+mod srgb;
+mod tiff_file;
+mod write;
 
-/// A colour picture, bottom row first, linear RGB.
-#[derive(Clone, Debug)]
-pub struct ColorImage {
-    /// Pixels across.
-    pub width: usize,
-    /// Pixels up.
-    pub height: usize,
-    /// What the pixels are stored as.
-    pub pixels: ColorPixels,
-}
+pub use atomic::OutputError;
+pub use channel::Channel;
+pub use color::{ColorImage, ColorPixels, ColorSpace, load_color};
+pub use environment::{EnvironmentImage, load_environment};
+pub use error::ImageError;
+pub use format::Format;
+pub use heights::load_heights;
+pub use srgb::{srgb_decode, srgb_encode};
+pub use write::{ExrChannel, write_exr, write_png_gray16, write_png_rgb8};
 
-/// Pixels in the precision they came in.
-#[derive(Clone, Debug)]
-pub enum ColorPixels {
-    /// 8-bit sRGB-encoded RGB.
-    Srgb8(Vec<[u8; 3]>),
-    /// Linear RGB.
-    Linear(Vec<[f32; 3]>),
-}
+/// Most pixels of a picture that is read: 32768 x 16384.
+pub const MAX_PIXELS: u64 = 1 << 29;
 
-/// An equirectangular HDR picture: top row first, the top row is +Y, the middle column looks along -Z.
-#[derive(Clone, Debug)]
-pub struct EnvironmentImage {
-    /// Pixels across.
-    pub width: usize,
-    /// Pixels down.
-    pub height: usize,
-    /// Linear RGB radiance, finite, non-negative.
-    pub pixels: Vec<Vec3>,
-}
+#[cfg(test)]
+mod test_files;

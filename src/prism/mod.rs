@@ -1,41 +1,35 @@
 //! How a ray meets one prism: the room of Projective Displacement Mapping.
+//!
+//! R. Hoetzlein, "Projective Displacement Mapping for Ray Traced Editable Surfaces", Computer Graphics Forum 44(7),
+//! 2025, doi 10.1111/cgf.70235.
+//!
+//! A ray that enters a prism's box is clipped to slabs ([`frame`], [`path`]), then to the prism's sides
+//! ([`sides`]); along what is left the surface is looked for ([`march`]), and the crossing is polished on the
+//! surface's definition ([`crate::surface`]). This room knows no Embree, no scene and no picture.
+
+mod frame;
+#[allow(unsafe_code)] // SIMD stamps
+mod kernel;
+mod march;
+mod normal;
+mod path;
+mod sides;
+mod simd;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::ray::{Aabb, Ray};
-use crate::surface::DisplacedSurface;
+use crate::surface::{DisplacedSurface, SurfacePoint};
+use frame::Prism;
+use kernel::Kernel;
+use path::HeightField;
 
-/// The step of the uniform march.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step {
-    /// Texels of the map per step.
-    Texels(f32),
-    /// World units per step.
-    World(f32),
-}
-
-/// How the surface is looked for inside a prism.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum March {
-    /// The paper's march: equal steps along the ray.
-    Uniform {
-        /// Step length.
-        step: Step,
-        /// Shift the samples of each ray by a random part of a step (thin-feature sampling).
-        jitter: bool,
-    },
-}
-
-/// The instruction set of a kernel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SimdLevel {
-    /// What every machine of the architecture has.
-    Baseline,
-    /// x86-64 with AVX2 and FMA.
-    Avx2,
-}
+pub use march::{March, MarchError, Step};
+pub use simd::SimdLevel;
 
 /// Where a ray first meets the surface inside one prism.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,26 +40,62 @@ pub struct PrismHit {
     pub u: f32,
     /// Barycentric coordinate of vertex 2.
     pub v: f32,
-    /// Geometric normal of S, unit.
+    /// Geometric normal of S, unit, on the base mesh's outer side.
     pub ng: Vec3,
 }
 
 /// A displaced surface as a set of prisms, one per base triangle: what a backend traces.
 pub struct Prisms {
     surface: Arc<DisplacedSurface>,
+    records: Vec<Prism>,
+    heights: HeightField,
+    march: March,
+    kernel: Kernel,
 }
+
+/// Below this n_i . Ng a prism is bent: its rays take the slower exact route.
+const BENT: f32 = 0.1;
 
 impl Prisms {
     /// Builds the prisms; the kernel is chosen once, for this machine.
-    pub fn new(surface: Arc<DisplacedSurface>, march: March) -> Self {
-        let _ = march;
-        Self { surface }
+    pub fn new(surface: Arc<DisplacedSurface>, march: March) -> Result<Self, MarchError> {
+        let march = march.validate()?;
+        let count = surface.mesh().triangles().len() as u32;
+        let records: Vec<Prism> = (0..count)
+            .map(|prim| Prism::new(&surface.patch(prim)))
+            .collect();
+        let (low, high) = surface.range();
+        let offset = (0..count)
+            .filter(|&prim| records[prim as usize].lowest_normal_height() > BENT)
+            .map(|prim| surface.patch(prim).offsets([low.into(), high.into()]))
+            .fold([low, high], |[a, b], [c, d]| {
+                [a.min(c as f32), b.max(d as f32)]
+            });
+        let unit = surface.map().texels().unit();
+        let heights = HeightField {
+            displacement: [low, high],
+            offset,
+            texel_per_world: unit / surface.displacement().scale,
+            texel_midlevel: unit * surface.displacement().midlevel,
+        };
+        Ok(Self {
+            surface,
+            records,
+            heights,
+            march,
+            kernel: Kernel::new(SimdLevel::detect()),
+        })
     }
 
     /// The same prisms with kernels of a given level (for tests and benches); `None` if this machine lacks it.
-    pub fn with_simd(self, level: SimdLevel) -> Option<Self> {
-        let _ = level;
-        todo!()
+    pub fn with_simd(mut self, level: SimdLevel) -> Option<Self> {
+        self.kernel = Kernel::new(level);
+        level.is_supported().then_some(self)
+    }
+
+    /// The level of the kernels.
+    pub fn simd(&self) -> SimdLevel {
+        self.kernel.level()
     }
 
     /// The surface that the prisms enclose.
@@ -73,35 +103,78 @@ impl Prisms {
         &self.surface
     }
 
+    /// How the surface is looked for.
+    pub fn march(&self) -> March {
+        self.march
+    }
+
     /// Number of prisms = number of base triangles.
     pub fn len(&self) -> usize {
-        self.surface.mesh.triangles().len()
+        self.records.len()
     }
 
     /// Never true: a base mesh has at least one triangle.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Conservative bounds of the surface over one base triangle.
-    pub fn bounds(&self, prim: u32) -> Aabb {
-        let _ = prim;
-        todo!()
-    }
-
-    /// The first intersection of `ray` with the surface over base triangle `prim`, with t in (tnear, tfar).
-    pub fn intersect(&self, prim: u32, ray: &Ray) -> Option<PrismHit> {
-        let _ = (prim, ray);
-        todo!()
-    }
-
-    /// Whether there is any.
-    pub fn occluded(&self, prim: u32, ray: &Ray) -> bool {
-        self.intersect(prim, ray).is_some()
+        self.records.is_empty()
     }
 
     /// Bytes beside mesh and map: 108 per base triangle.
     pub fn bytes(&self) -> usize {
-        todo!()
+        size_of_val(&self.records[..])
+    }
+
+    /// Conservative bounds of the surface over one base triangle: every point is sum b_i (v_i + w n_i) for one w of
+    /// the range, so it is in the hull of six corners; and no further than the largest |D| from the triangle.
+    pub fn bounds(&self, prim: u32) -> Aabb {
+        let patch = self.surface.patch(prim);
+        let [low, high] = self.heights.displacement.map(f64::from);
+        let offsets = patch.offsets([low, high]);
+        let (mut hull_min, mut hull_max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for (&v, &n) in patch.vertices.iter().zip(&patch.normals) {
+            (min, max) = (min.min(v), max.max(v));
+            for w in offsets {
+                (hull_min, hull_max) = (hull_min.min(v + w * n), hull_max.max(v + w * n));
+            }
+        }
+        let reach = low.abs().max(high.abs());
+        let bounds = Aabb {
+            min: hull_min.max(min - reach).as_vec3(),
+            max: hull_max.min(max + reach).as_vec3(),
+        };
+        const ULPS: f32 = 16.0;
+        bounds.padded(ULPS)
+    }
+
+    /// The first intersection of `ray` with the surface over base triangle `prim`, with t in (tnear, tfar).
+    #[inline]
+    pub fn intersect(&self, prim: u32, ray: &Ray) -> Option<PrismHit> {
+        self.kernel.intersect(self, prim, ray)
+    }
+
+    /// Whether there is any.
+    #[inline]
+    pub fn occluded(&self, prim: u32, ray: &Ray) -> bool {
+        self.kernel.occluded(self, prim, ray)
+    }
+
+    /// All a shader wants to know of the point (u, v) over base triangle `prim`.
+    pub fn point(&self, prim: u32, u: f32, v: f32) -> SurfacePoint {
+        let patch = self.surface.patch(prim);
+        let (bu, bv) = (f64::from(u), f64::from(v));
+        let point = patch.point(bu, bv);
+        let [st0, st1, st2] = self.surface.mesh().corner_texcoords(prim);
+        SurfacePoint {
+            position: point.position.as_vec3(),
+            base_position: patch.base(bu, bv).as_vec3(),
+            geometric_normal: point
+                .du
+                .cross(point.dv)
+                .normalize_or(patch.face_normal())
+                .as_vec3(),
+            shading_normal: normal::smooth(&patch, bu, bv).as_vec3(),
+            texcoord: st0 + u * (st1 - st0) + v * (st2 - st0),
+            displacement: point.displacement as f32,
+        }
     }
 }

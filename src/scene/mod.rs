@@ -2,6 +2,12 @@
 //!
 //! `file -> Scene -> World -> Tracer`; the renderer reads the rest (camera, film, materials, lights) from here.
 
+mod build;
+mod error;
+mod file;
+pub mod load;
+mod world;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -10,6 +16,10 @@ use glam::{Affine3A, Vec3};
 use crate::image::{ColorImage, EnvironmentImage};
 use crate::prism::March;
 use crate::surface::{BaseMesh, DisplacedSurface, UvTransform, Wrap};
+
+pub use build::{Loaded, MapFile, MeshAndMap};
+pub use error::{AssetError, Place, SceneError};
+pub(crate) use file::{MAX_SIDE, MAX_SPP, STEP_TEXELS, too_many_pixels};
 
 /// A perspective camera.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,11 +1,11 @@
-//! The displaced surface S(b) itself, and what a shader wants to know of a point on it.
+//! The displaced surface S(b): a base mesh, a map, and what the map's heights mean.
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec2, Vec2, Vec3};
 use thiserror::Error;
 
-use super::{BaseMesh, DisplacementMap, UvTransform};
+use super::{BaseMesh, DisplacementMap, Patch, UvTransform};
 
 /// How a map's heights become displacement: D = scale * (h - midlevel).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,48 +18,156 @@ pub struct Displacement {
     pub uv: UvTransform,
 }
 
+impl Displacement {
+    /// Heights times `scale`, from the base surface outward.
+    pub fn new(scale: f32) -> Self {
+        Self {
+            scale,
+            midlevel: 0.0,
+            uv: UvTransform::default(),
+        }
+    }
+}
+
 /// Why a surface was refused.
 #[derive(Debug, Error, PartialEq)]
 pub enum SurfaceError {
     /// The mesh has no texture coordinates.
-    #[error("the mesh has no texture coordinates; unwrap it (any UV tool) before displacing it")]
+    #[error(
+        "the mesh has no texture coordinates, so the map cannot be laid on it; \
+         unwrap it in a modelling program and export it with UVs"
+    )]
     MissingTexcoords,
     /// NaN, infinite or zero where a number is needed.
-    #[error("displacement {what} is {value}; expected a finite number{extra}")]
+    #[error("{what} is {value}; expected {expected}")]
     BadParameter {
         /// Which parameter.
         what: &'static str,
         /// What was found.
         value: f32,
-        /// More of what is expected.
-        extra: &'static str,
+        /// What is expected.
+        expected: &'static str,
     },
 }
 
 /// A base mesh displaced by a map.
 #[derive(Clone, Debug)]
 pub struct DisplacedSurface {
-    /// The base mesh.
-    pub mesh: Arc<BaseMesh>,
-    /// The heights.
-    pub map: Arc<DisplacementMap>,
-    /// What heights mean.
-    pub displacement: Displacement,
+    mesh: Arc<BaseMesh>,
+    map: Arc<DisplacementMap>,
+    displacement: Displacement,
 }
 
-/// All a shader wants to know of a hit, in the surface's own space.
+/// All a shader wants to know of a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// S(b), or P(b) for an undisplaced mesh.
     pub position: Vec3,
     /// P(b).
     pub base_position: Vec3,
-    /// Unit geometric normal of S (true tangent plane), on the base mesh's outer side.
+    /// Unit geometric normal of S (its true tangent plane), on the base mesh's outer side.
     pub geometric_normal: Vec3,
     /// Unit smooth normal: Ns' = Ns - Ng + N' (the paper, equations 18 and 26).
     pub shading_normal: Vec3,
-    /// Texture coordinates of the mesh (before any UV transform).
+    /// Texture coordinates of the mesh, before any UV transform.
     pub texcoord: Vec2,
     /// D, world units along the unit interpolated normal.
     pub displacement: f32,
+}
+
+impl DisplacedSurface {
+    /// Checks that the parts fit together.
+    pub fn new(
+        mesh: Arc<BaseMesh>,
+        map: Arc<DisplacementMap>,
+        displacement: Displacement,
+    ) -> Result<Self, SurfaceError> {
+        if mesh.texcoords().is_empty() {
+            return Err(SurfaceError::MissingTexcoords);
+        }
+        let finite = |what, value: f32| {
+            let expected = "a finite number";
+            if value.is_finite() {
+                Ok(())
+            } else {
+                Err(SurfaceError::BadParameter {
+                    what,
+                    value,
+                    expected,
+                })
+            }
+        };
+        let Displacement {
+            scale,
+            midlevel,
+            uv,
+        } = displacement;
+        finite("displacement scale", scale)?;
+        if scale == 0.0 {
+            let expected = "a number other than 0 (leave the displacement out instead)";
+            return Err(SurfaceError::BadParameter {
+                what: "displacement scale",
+                value: scale,
+                expected,
+            });
+        }
+        finite("displacement midlevel", midlevel)?;
+        for value in [
+            uv.scale.x,
+            uv.scale.y,
+            uv.offset.x,
+            uv.offset.y,
+            uv.rotation,
+        ] {
+            finite("displacement uv transform", value)?;
+        }
+        Ok(Self {
+            mesh,
+            map,
+            displacement,
+        })
+    }
+
+    /// The base mesh.
+    pub fn mesh(&self) -> &Arc<BaseMesh> {
+        &self.mesh
+    }
+
+    /// The heights.
+    pub fn map(&self) -> &Arc<DisplacementMap> {
+        &self.map
+    }
+
+    /// What heights mean.
+    pub fn displacement(&self) -> &Displacement {
+        &self.displacement
+    }
+
+    /// Smallest and largest D anywhere on the map, world units.
+    pub fn range(&self) -> (f32, f32) {
+        let (low, high) = self.map.range();
+        let d = |h| self.displacement.scale * (h - self.displacement.midlevel);
+        (d(low).min(d(high)), d(low).max(d(high)))
+    }
+
+    /// The piece of the surface over one base triangle.
+    pub fn patch(&self, triangle: u32) -> Patch<'_> {
+        let texcoords = self
+            .mesh
+            .corner_texcoords(triangle)
+            .map(|st| self.displacement.uv.apply(st).as_dvec2());
+        let wrap = self.map.wrap();
+        let periods = DVec2::new(
+            wrap.whole_periods(texcoords[0].x),
+            wrap.whole_periods(texcoords[0].y),
+        );
+        Patch {
+            vertices: self.mesh.corners(triangle).map(|v| v.as_dvec3()),
+            normals: self.mesh.corner_normals(triangle).map(|n| n.as_dvec3()),
+            texels: texcoords.map(|st| self.map.to_texel(st - periods)),
+            map: &self.map,
+            scale: f64::from(self.displacement.scale),
+            midlevel: f64::from(self.displacement.midlevel),
+        }
+    }
 }

@@ -1,19 +1,67 @@
 //! The base mesh: indexed triangles with unit normals and texture coordinates, proven sound once.
 
-use glam::{Vec2, Vec3};
+use glam::{Affine3A, DVec3, Vec2, Vec3};
 use thiserror::Error;
 
+use super::normals;
 use crate::ray::Aabb;
 
 /// Why a mesh was refused. The loader that met it adds the file's name and the place.
 #[derive(Debug, Error, PartialEq)]
 pub enum MeshError {
-    // helper fills in: NoTriangles, IndexOutOfRange{triangle,index,vertices}, NotFinite{what,index}, MissingTexcoords ...
     /// No triangle at all, or none with an area.
     #[error("no triangles: the mesh has {faces} faces and none of them has an area")]
     NoTriangles {
         /// Faces in the file.
         faces: usize,
+    },
+    /// More than 32-bit vertex indices can serve when every corner stands alone.
+    #[error("the mesh has {found} {what}; at most {max} are supported")]
+    TooLarge {
+        /// `vertices` or `triangles`.
+        what: &'static str,
+        /// How many were given.
+        found: usize,
+        /// Most that are supported.
+        max: usize,
+    },
+    /// A triangle names a vertex that is not there.
+    #[error(
+        "triangle {triangle} refers to vertex {index}, but the mesh has {vertices} vertices (counted from 0)"
+    )]
+    IndexOutOfRange {
+        /// Index of the triangle, from 0.
+        triangle: usize,
+        /// The vertex it names.
+        index: u32,
+        /// Vertices in the mesh.
+        vertices: usize,
+    },
+    /// A NaN or infinite coordinate.
+    #[error("the {what} of vertex {vertex} (from 0) holds {value}; coordinates must be finite")]
+    NotFinite {
+        /// `position`, `normal` or `texture coordinate`.
+        what: &'static str,
+        /// Index of the vertex, from 0.
+        vertex: usize,
+        /// The first such coordinate.
+        value: f32,
+    },
+    /// A per-vertex array that is neither empty nor as long as the positions.
+    #[error("{found} {what} for {vertices} vertices; expected one per vertex, or none")]
+    WrongLength {
+        /// `normals` or `texture coordinates`.
+        what: &'static str,
+        /// Entries given.
+        found: usize,
+        /// Vertices in the mesh.
+        vertices: usize,
+    },
+    /// A crease angle that is NaN, infinite or negative.
+    #[error("the crease angle is {found} rad; expected a number from 0 to pi")]
+    BadCreaseAngle {
+        /// What was found.
+        found: f32,
     },
 }
 
@@ -24,9 +72,9 @@ pub enum NormalMode {
     #[default]
     File,
     /// Angle-weighted averages of the faces around a vertex; an edge whose faces differ by more than
-    /// the crease angle (radians) is kept sharp by splitting its vertices.
+    /// the crease angle (radians) is kept sharp by splitting its vertices. The file's normals are ignored.
     Smooth {
-        /// Radians, 0 .. pi.
+        /// Radians, 0 (flat shading: only coplanar neighbours share a normal) .. pi (no edge is sharp).
         crease_angle: f32,
     },
 }
@@ -36,7 +84,7 @@ pub enum NormalMode {
 pub struct MeshReport {
     /// Zero-area faces that were dropped.
     pub degenerate_dropped: usize,
-    /// Whether normals were computed.
+    /// Whether any normal was computed.
     pub normals_computed: bool,
 }
 
@@ -45,7 +93,7 @@ pub struct MeshReport {
 pub struct MeshBuilder {
     /// Vertex positions, world units.
     pub positions: Vec<Vec3>,
-    /// Per vertex, or empty. Normalised by `build`.
+    /// Per vertex, or empty. Normalised by `build`; a zero stands for a missing normal.
     pub normals: Vec<Vec3>,
     /// Per vertex, or empty; v points up.
     pub texcoords: Vec<Vec2>,
@@ -64,10 +112,251 @@ pub struct BaseMesh {
 }
 
 impl MeshBuilder {
-    /// Validates, computes what is missing, drops zero-area faces.
-    pub fn build(self, _normals: NormalMode) -> Result<(BaseMesh, MeshReport), MeshError> {
-        todo!()
+    /// Validates, computes what is missing, drops zero-area faces and the vertices nobody uses.
+    ///
+    /// The order of the remaining triangles and of their corners stays. A face has no area when its
+    /// height over its longest edge is below 2^-23 of that edge: single precision knows no normal for it.
+    /// Vertices at the same position (bit for bit) get the same computed normal, bit for bit, unless a
+    /// crease parts them; so a seam of the texture coordinates neither creases nor cracks.
+    ///
+    /// In [`NormalMode::File`] a zero normal is replaced by the computed one. Normals that point against
+    /// their face are kept: they are the artist's.
+    ///
+    /// # Errors
+    ///
+    /// What [`MeshError`] lists; nothing else is checked or mended.
+    pub fn build(mut self, mode: NormalMode) -> Result<(BaseMesh, MeshReport), MeshError> {
+        self.validate()?;
+        let faces = self.triangles.len();
+        let positions = &self.positions;
+        self.triangles
+            .retain(|t| has_area(t.map(|i| positions[i as usize])));
+        if self.triangles.is_empty() {
+            return Err(MeshError::NoTriangles { faces });
+        }
+        let mut report = MeshReport {
+            degenerate_dropped: faces - self.triangles.len(),
+            normals_computed: false,
+        };
+        self.drop_unused_vertices();
+        report.normals_computed = self.finish_normals(mode)?;
+        let mesh = BaseMesh {
+            positions: self.positions,
+            normals: self.normals,
+            texcoords: self.texcoords,
+            triangles: self.triangles,
+        };
+        Ok((mesh, report))
     }
+
+    /// The mesh moved by `transform`: normals go by its inverse transpose, and a mirroring transform
+    /// turns the winding round, so that outside stays outside.
+    ///
+    /// A singular transform flattens the mesh; `build` then drops or refuses what lost its area.
+    pub fn transformed(mut self, transform: &Affine3A) -> Self {
+        for p in &mut self.positions {
+            *p = transform.transform_point3(*p);
+        }
+        let [x, y, z] = [
+            transform.matrix3.x_axis,
+            transform.matrix3.y_axis,
+            transform.matrix3.z_axis,
+        ]
+        .map(|axis| glam::Vec3::from(axis).as_dvec3());
+        let mirrored = x.cross(y).dot(z) < 0.0;
+        // The cofactor matrix is det * inverse transpose, and exists where the inverse does not.
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        let cofactors = [y.cross(z), z.cross(x), x.cross(y)].map(|c| sign * c);
+        for n in &mut self.normals {
+            let n_world = cofactors[0] * f64::from(n.x)
+                + cofactors[1] * f64::from(n.y)
+                + cofactors[2] * f64::from(n.z);
+            if n.is_finite() {
+                *n = normals::unit(n_world);
+            }
+        }
+        if mirrored {
+            for t in &mut self.triangles {
+                t.swap(1, 2);
+            }
+        }
+        self
+    }
+
+    /// Appends the faces of `other` after its own.
+    ///
+    /// Where only one of them has normals, the other's are left to `build`; where only one has texture
+    /// coordinates, the result has none.
+    pub fn append(&mut self, other: Self) {
+        // A mesh too large for 32 bits wraps here and is refused by `build`.
+        let base = self.positions.len() as u32;
+        if self.positions.is_empty() {
+            *self = other;
+            return;
+        }
+        if self.normals.is_empty() != other.normals.is_empty() {
+            self.normals.resize(self.positions.len(), Vec3::ZERO);
+        }
+        if self.texcoords.is_empty() || other.texcoords.is_empty() {
+            self.texcoords.clear();
+        } else {
+            self.texcoords.extend(other.texcoords);
+        }
+        self.positions.extend(other.positions);
+        self.normals.extend(other.normals);
+        if !self.normals.is_empty() {
+            self.normals.resize(self.positions.len(), Vec3::ZERO);
+        }
+        let shifted = other
+            .triangles
+            .into_iter()
+            .map(|t| t.map(|i| i.wrapping_add(base)));
+        self.triangles.extend(shifted);
+    }
+
+    fn validate(&self) -> Result<(), MeshError> {
+        let vertices = self.positions.len();
+        let sizes = [
+            ("vertices", vertices, u32::MAX as usize),
+            ("triangles", self.triangles.len(), u32::MAX as usize / 3),
+        ];
+        for (what, found, max) in sizes {
+            if found > max {
+                return Err(MeshError::TooLarge { what, found, max });
+            }
+        }
+        let lengths = [
+            ("normals", self.normals.len()),
+            ("texture coordinates", self.texcoords.len()),
+        ];
+        for (what, found) in lengths {
+            if found != 0 && found != vertices {
+                return Err(MeshError::WrongLength {
+                    what,
+                    found,
+                    vertices,
+                });
+            }
+        }
+        all_finite("position", self.positions.iter().map(|p| p.to_array()))?;
+        all_finite("normal", self.normals.iter().map(|n| n.to_array()))?;
+        all_finite(
+            "texture coordinate",
+            self.texcoords.iter().map(|st| st.to_array()),
+        )?;
+        for (triangle, corners) in self.triangles.iter().enumerate() {
+            if let Some(&index) = corners.iter().find(|&&i| i as usize >= vertices) {
+                return Err(MeshError::IndexOutOfRange {
+                    triangle,
+                    index,
+                    vertices,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the order of those that are used. Bounds and memory are then the surface's own.
+    fn drop_unused_vertices(&mut self) {
+        let mut used = vec![false; self.positions.len()];
+        for &i in self.triangles.as_flattened() {
+            used[i as usize] = true;
+        }
+        if used.iter().all(|&u| u) {
+            return;
+        }
+        let mut next = 0;
+        let new_index: Vec<u32> = used
+            .iter()
+            .map(|&u| {
+                next += u32::from(u);
+                next.wrapping_sub(1)
+            })
+            .collect();
+        for i in self.triangles.as_flattened_mut() {
+            *i = new_index[*i as usize];
+        }
+        keep(&mut self.positions, &used);
+        keep(&mut self.normals, &used);
+        keep(&mut self.texcoords, &used);
+    }
+
+    /// Makes every normal a unit vector; true if any had to be computed.
+    fn finish_normals(&mut self, mode: NormalMode) -> Result<bool, MeshError> {
+        let crease_angle = match mode {
+            NormalMode::Smooth { crease_angle } => crease_angle,
+            NormalMode::File => std::f32::consts::PI,
+        };
+        if !(crease_angle.is_finite() && crease_angle >= 0.0) {
+            return Err(MeshError::BadCreaseAngle {
+                found: crease_angle,
+            });
+        }
+        let keep_file = mode == NormalMode::File && !self.normals.is_empty();
+        if keep_file && self.normals.iter().all(|&n| n != Vec3::ZERO) {
+            for n in &mut self.normals {
+                *n = normals::unit(n.as_dvec3());
+            }
+            return Ok(false);
+        }
+        let smooth = normals::smooth(&self.positions, &self.triangles, crease_angle);
+        self.split_vertices(&smooth.copies);
+        let given = std::mem::replace(&mut self.normals, smooth.normals);
+        if keep_file {
+            // Copies of split vertices came last, each with the file's normal of its original.
+            for (n, &file) in self.normals.iter_mut().zip(&given) {
+                if file != Vec3::ZERO {
+                    *n = normals::unit(file.as_dvec3());
+                }
+            }
+        }
+        self.triangles = smooth.triangles;
+        Ok(true)
+    }
+
+    /// Appends a copy of each named vertex.
+    fn split_vertices(&mut self, originals: &[u32]) {
+        for &i in originals {
+            self.positions.push(self.positions[i as usize]);
+            if !self.texcoords.is_empty() {
+                self.texcoords.push(self.texcoords[i as usize]);
+            }
+            if !self.normals.is_empty() {
+                self.normals.push(self.normals[i as usize]);
+            }
+        }
+    }
+}
+
+/// Whether single precision can tell the face's normal.
+fn has_area(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    let longest = (b - a)
+        .length_squared()
+        .max((c - b).length_squared())
+        .max((a - c).length_squared());
+    DVec3::cross(b - a, c - a).length() > f64::from(f32::EPSILON) * longest
+}
+
+fn all_finite<const N: usize>(
+    what: &'static str,
+    values: impl Iterator<Item = [f32; N]>,
+) -> Result<(), MeshError> {
+    for (vertex, coordinates) in values.enumerate() {
+        if let Some(&value) = coordinates.iter().find(|x| !x.is_finite()) {
+            return Err(MeshError::NotFinite {
+                what,
+                vertex,
+                value,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn keep<T>(values: &mut Vec<T>, used: &[bool]) {
+    let mut flags = used.iter();
+    values.retain(|_| flags.next().is_some_and(|&u| u));
 }
 
 impl BaseMesh {
@@ -122,5 +411,206 @@ impl BaseMesh {
             + size_of_val(&self.normals[..])
             + size_of_val(&self.texcoords[..])
             + size_of_val(&self.triangles[..])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Quat, vec2, vec3};
+
+    fn quad() -> MeshBuilder {
+        MeshBuilder {
+            positions: vec![
+                vec3(0.0, 0.0, 0.0),
+                vec3(1.0, 0.0, 0.0),
+                vec3(1.0, 1.0, 0.0),
+                vec3(0.0, 1.0, 0.0),
+            ],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..MeshBuilder::default()
+        }
+    }
+
+    fn refused(change: impl FnOnce(&mut MeshBuilder)) -> MeshError {
+        let mut builder = quad();
+        change(&mut builder);
+        builder.build(NormalMode::File).expect_err("refused")
+    }
+
+    #[test]
+    fn an_index_out_of_range_names_triangle_index_and_count() {
+        assert_eq!(
+            refused(|m| m.triangles[1][2] = 4),
+            MeshError::IndexOutOfRange {
+                triangle: 1,
+                index: 4,
+                vertices: 4
+            }
+        );
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_name_what_and_where() {
+        assert!(matches!(
+            refused(|m| m.positions[2].y = f32::NAN),
+            MeshError::NotFinite { what: "position", vertex: 2, value } if value.is_nan()
+        ));
+        let infinite = MeshError::NotFinite {
+            what: "normal",
+            vertex: 3,
+            value: f32::NEG_INFINITY,
+        };
+        let normals = vec![Vec3::Z, Vec3::Z, Vec3::Z, Vec3::NEG_INFINITY];
+        assert_eq!(refused(|m| m.normals = normals), infinite);
+        assert!(matches!(
+            refused(|m| m.texcoords = vec![vec2(0.0, f32::NAN); 4]),
+            MeshError::NotFinite {
+                what: "texture coordinate",
+                vertex: 0,
+                ..
+            }
+        ));
+    }
+
+    #[test]
+    fn arrays_of_the_wrong_length_are_refused() {
+        assert_eq!(
+            refused(|m| m.normals = vec![Vec3::Z; 3]),
+            MeshError::WrongLength {
+                what: "normals",
+                found: 3,
+                vertices: 4
+            }
+        );
+        assert!(matches!(
+            refused(|m| m.texcoords = vec![Vec2::ZERO; 5]),
+            MeshError::WrongLength { found: 5, .. }
+        ));
+    }
+
+    #[test]
+    fn a_mesh_without_area_is_refused() {
+        assert_eq!(
+            refused(|m| m.triangles.clear()),
+            MeshError::NoTriangles { faces: 0 }
+        );
+        assert_eq!(
+            refused(|m| m.triangles = vec![[0, 1, 1], [2, 2, 2]]),
+            MeshError::NoTriangles { faces: 2 }
+        );
+    }
+
+    #[test]
+    fn zero_area_faces_go_with_their_vertices_and_the_rest_keeps_its_order() {
+        let mut builder = quad();
+        builder.texcoords = builder.positions.iter().map(|p| p.truncate()).collect();
+        builder.positions.insert(0, vec3(9.0, 9.0, 9.0));
+        builder.texcoords.insert(0, vec2(9.0, 9.0));
+        builder.triangles = vec![[1, 2, 3], [0, 1, 1], [1, 3, 4]];
+        let (mesh, report) = builder.build(NormalMode::File).unwrap();
+        assert_eq!(report.degenerate_dropped, 1);
+        assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(mesh.positions(), quad().positions);
+        assert_eq!(mesh.corner_texcoords(1)[2], vec2(0.0, 1.0));
+        assert_eq!(mesh.bounds().max, vec3(1.0, 1.0, 0.0));
+    }
+
+    #[test]
+    fn area_is_judged_by_shape_not_by_size() {
+        for exponent in [-30, 0, 30] {
+            let mut builder = quad();
+            for p in &mut builder.positions {
+                *p *= 10_f32.powi(exponent);
+            }
+            let (_, report) = builder.build(NormalMode::File).unwrap();
+            assert_eq!(report.degenerate_dropped, 0, "size 1e{exponent}");
+        }
+    }
+
+    #[test]
+    fn file_normals_are_normalised_and_kept_even_against_the_face() {
+        let mut builder = quad();
+        builder.normals = vec![
+            vec3(0.0, 0.0, -3.0),
+            Vec3::X * 1e-30,
+            Vec3::Y * 1e30,
+            Vec3::Z,
+        ];
+        let (mesh, report) = builder.build(NormalMode::File).unwrap();
+        assert!(!report.normals_computed);
+        assert_eq!(mesh.normals(), [-Vec3::Z, Vec3::X, Vec3::Y, Vec3::Z]);
+    }
+
+    #[test]
+    fn a_zero_normal_is_computed_and_the_others_stay() {
+        let mut builder = quad();
+        builder.normals = vec![Vec3::X, Vec3::ZERO, Vec3::X, Vec3::X];
+        let (mesh, report) = builder.build(NormalMode::File).unwrap();
+        assert!(report.normals_computed);
+        assert_eq!(mesh.normals(), [Vec3::X, Vec3::Z, Vec3::X, Vec3::X]);
+    }
+
+    #[test]
+    fn a_bad_crease_angle_is_refused() {
+        for bad in [-0.1, f32::NAN, f32::INFINITY] {
+            let mode = NormalMode::Smooth { crease_angle: bad };
+            assert!(matches!(
+                quad().build(mode),
+                Err(MeshError::BadCreaseAngle { .. })
+            ));
+        }
+    }
+
+    /// A tilted plane, its normal not along any axis of the transforms.
+    fn tilted() -> MeshBuilder {
+        let mut builder = quad().transformed(&Affine3A::from_quat(Quat::from_rotation_x(0.7)));
+        builder.normals = vec![Quat::from_rotation_x(0.7) * Vec3::Z; 4];
+        builder
+    }
+
+    #[test]
+    fn normals_stay_normal_to_the_face_under_any_transform() {
+        for scale in [
+            vec3(2.0, 0.5, 3.0),
+            vec3(-2.0, 0.5, 3.0),
+            vec3(-1.0, -1.0, -1.0),
+        ] {
+            let transform = Affine3A::from_scale_rotation_translation(
+                scale,
+                Quat::from_rotation_z(0.3),
+                vec3(1.0, 2.0, 3.0),
+            );
+            let (mesh, _) = tilted()
+                .transformed(&transform)
+                .build(NormalMode::File)
+                .unwrap();
+            let [a, b, c] = mesh.corners(0);
+            let face = (b - a).cross(c - a).normalize();
+            for n in mesh.normals() {
+                assert!((*n - face).length() < 1e-6, "{scale}: {n} against {face}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_singular_transform_leaves_nothing() {
+        let flat = Affine3A::from_scale(vec3(0.0, 1.0, 1.0));
+        let result = quad().transformed(&flat).build(NormalMode::File);
+        assert_eq!(result.unwrap_err(), MeshError::NoTriangles { faces: 2 });
+    }
+
+    #[test]
+    fn appending_fills_missing_normals_and_drops_lonely_texture_coordinates() {
+        let mut whole = quad();
+        whole.texcoords = vec![Vec2::ZERO; 4];
+        let mut other = quad();
+        other.normals = vec![Vec3::X; 4];
+        whole.append(other);
+        assert_eq!(whole.triangles[3], [4, 6, 7]);
+        assert_eq!(whole.normals[3..5], [Vec3::ZERO, Vec3::X]);
+        assert!(whole.texcoords.is_empty());
+        let (mesh, _) = whole.build(NormalMode::File).unwrap();
+        assert_eq!(mesh.normals()[0], Vec3::Z);
     }
 }

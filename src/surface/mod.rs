@@ -13,7 +13,13 @@
 mod displaced;
 mod map;
 mod mesh;
+mod normals;
+mod patch;
+mod uv;
 
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
-pub use map::{DisplacementMap, MapError, Texels, UvTransform, Wrap};
+pub use map::{DisplacementMap, HeightSample, MapError, Texels};
 pub use mesh::{BaseMesh, MeshBuilder, MeshError, MeshReport, NormalMode};
+pub(crate) use patch::solve;
+pub use patch::{Patch, PatchPoint};
+pub use uv::{UvTransform, Wrap};

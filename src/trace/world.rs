@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{Affine3A, Vec3};
 
 use super::{Hit, INVALID_ID};
 use crate::prism::Prisms;
@@ -97,7 +97,44 @@ impl World {
 
     /// All a shader wants to know of a hit, in world space.
     pub fn surface_point(&self, hit: &Hit) -> SurfacePoint {
-        let _ = hit;
-        todo!()
+        let Resolved { object, transform } = self.resolve(hit);
+        let point = match &self.objects[object].shape {
+            Shape::Displaced(prisms) => prisms.point(hit.prim, hit.u, hit.v),
+            Shape::Triangles(mesh) => triangle_point(mesh, hit),
+        };
+        match transform {
+            None => point,
+            Some(to_world) => transformed(&point, to_world),
+        }
+    }
+}
+
+fn triangle_point(mesh: &BaseMesh, hit: &Hit) -> SurfacePoint {
+    let b = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+    let [v0, v1, v2] = mesh.corners(hit.prim);
+    let [n0, n1, n2] = mesh.corner_normals(hit.prim);
+    let [st0, st1, st2] = mesh.corner_texcoords(hit.prim);
+    let position = b.x * v0 + b.y * v1 + b.z * v2;
+    let geometric_normal = (v1 - v0).cross(v2 - v0).normalize();
+    SurfacePoint {
+        position,
+        base_position: position,
+        geometric_normal,
+        shading_normal: (b.x * n0 + b.y * n1 + b.z * n2).normalize_or(geometric_normal),
+        texcoord: b.x * st0 + b.y * st1 + b.z * st2,
+        displacement: 0.0,
+    }
+}
+
+/// Points by the transform, normals by its inverse transpose (which keeps outer outer under mirroring too); the displacement stays in the object's units.
+fn transformed(point: &SurfacePoint, to_world: &Affine3A) -> SurfacePoint {
+    let normal_matrix = to_world.matrix3.inverse().transpose();
+    let normal = |n: Vec3| (normal_matrix * n).normalize();
+    SurfacePoint {
+        position: to_world.transform_point3(point.position),
+        base_position: to_world.transform_point3(point.base_position),
+        geometric_normal: normal(point.geometric_normal),
+        shading_normal: normal(point.shading_normal),
+        ..*point
     }
 }

@@ -1,0 +1,77 @@
+//! The three kinds of rays that are timed.
+
+use std::f32::consts::TAU;
+
+use glam::Vec3;
+use prismarch::ray::Ray;
+use prismarch::trace::Tracer;
+
+use super::scene::random;
+
+/// Secondary rays start this far along, so that they leave the surface they start on.
+const TNEAR: f32 = 1e-3;
+
+/// Primary rays with the hits' secondary rays; all unit directions.
+pub struct Rays {
+    /// `size` x `size`, row by row: a pinhole camera that the displaced unit sphere fills.
+    pub primary: Vec<Ray>,
+    /// From every primary hit in a cosine-distributed direction around the geometric normal.
+    pub bounce: Vec<Ray>,
+    /// As `bounce`, in other directions; traced as occlusion rays.
+    pub occlusion: Vec<Ray>,
+}
+
+impl Rays {
+    /// The rays for `size` x `size` pixels; `tracer` finds where secondary rays start.
+    pub fn new(size: u32, tracer: &dyn Tracer) -> Self {
+        let primary = primary(size);
+        let mut bounce = Vec::new();
+        let mut occlusion = Vec::new();
+        for (index, ray) in (0u32..).zip(&primary) {
+            let Some(hit) = tracer.intersect(ray) else {
+                continue;
+            };
+            let facing = if hit.ng.dot(ray.direction) < 0.0 {
+                hit.ng
+            } else {
+                -hit.ng
+            };
+            let mut from_here = |salt: u32| {
+                let mut ray = Ray::new(ray.at(hit.t), cosine(facing, 4 * index + salt));
+                ray.tnear = TNEAR;
+                ray
+            };
+            bounce.push(from_here(0));
+            occlusion.push(from_here(2));
+        }
+        Self {
+            primary,
+            bounce,
+            occlusion,
+        }
+    }
+}
+
+fn primary(size: u32) -> Vec<Ray> {
+    const EYE: Vec3 = Vec3::new(0.0, -4.0, 1.0);
+    const HALF_WIDTH: f32 = 0.3;
+    let forward = -EYE.normalize();
+    let right = forward.cross(Vec3::Z).normalize();
+    let up = right.cross(forward);
+    let on_film = |i: u32| ((i as f32 + 0.5) / size as f32 * 2.0 - 1.0) * HALF_WIDTH;
+    (0..size * size)
+        .map(|i| {
+            let direction = forward + on_film(i % size) * right - on_film(i / size) * up;
+            Ray::new(EYE, direction.normalize())
+        })
+        .collect()
+}
+
+/// A cosine-distributed unit direction around the unit vector `normal`: a point on the unit sphere
+/// around its tip.
+fn cosine(normal: Vec3, seed: u32) -> Vec3 {
+    let z = 2.0 * random(seed) - 1.0;
+    let (sin, cos) = (TAU * random(seed + 1)).sin_cos();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    (normal + 0.999 * Vec3::new(r * cos, r * sin, z)).normalize()
+}

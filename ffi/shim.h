@@ -1,0 +1,133 @@
+/* What prismarch asks of Embree, in words that do not depend on Embree's version.
+ *
+ * This header includes nothing of Embree; shim.c is the only file that does. Every call that can fail
+ * reports through the device's error function, on the calling thread, before it returns.
+ */
+#ifndef PRISMARCH_SHIM_H
+#define PRISMARCH_SHIM_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Instance levels a hit reports; the library may have more, but is asked for no more. */
+#define PM_INSTANCE_LEVELS 1
+
+/* No geometry, no instance. */
+#define PM_INVALID_ID 0xffffffffu
+
+typedef struct pm_device pm_device;
+typedef struct pm_scene pm_scene;
+typedef struct pm_geometry pm_geometry;
+
+/* Embree's own numbers. */
+enum {
+  PM_ERROR_NONE = 0,
+  PM_ERROR_UNKNOWN = 1,
+  PM_ERROR_INVALID_ARGUMENT = 2,
+  PM_ERROR_INVALID_OPERATION = 3,
+  PM_ERROR_OUT_OF_MEMORY = 4,
+  PM_ERROR_UNSUPPORTED_CPU = 5,
+  PM_ERROR_CANCELLED = 6
+};
+
+enum { PM_QUALITY_LOW = 0, PM_QUALITY_MEDIUM = 1, PM_QUALITY_HIGH = 2, PM_QUALITY_REFIT = 3 };
+
+enum { PM_SCENE_DYNAMIC = 1, PM_SCENE_COMPACT = 2, PM_SCENE_ROBUST = 4 };
+
+/* Word for word Embree's RTCRay: t in (tnear, tfar) along the unnormalised direction. */
+typedef struct pm_ray {
+  _Alignas(16) float org[3];
+  float tnear;
+  float dir[3];
+  float time;
+  float tfar;
+  uint32_t mask;
+  uint32_t id;
+  uint32_t flags;
+} pm_ray;
+
+/* Where a ray meets one primitive. ng need not be of unit length. */
+typedef struct pm_hit {
+  float t, u, v;
+  float ng[3];
+} pm_hit;
+
+/* Where a ray meets a scene. ng is in object space, as the hit test or Embree gave it. */
+typedef struct pm_scene_hit {
+  pm_hit at;
+  uint32_t prim;
+  uint32_t geom;
+  uint32_t inst[PM_INSTANCE_LEVELS];
+} pm_scene_hit;
+
+/* The test of one primitive of a user geometry. Called from many threads at once; must not unwind.
+ *   bounds     writes min x y z, max x y z, wide enough for any rounding in a box test.
+ *   intersect  the first hit with t in (tnear, tfar); fills `hit` and returns true, or returns false.
+ *   occluded   whether there is one. */
+typedef struct pm_hit_test {
+  void (*bounds)(const void *user, uint32_t prim, float out[6]);
+  bool (*intersect)(const void *user, uint32_t prim, const pm_ray *ray, pm_hit *hit);
+  bool (*occluded)(const void *user, uint32_t prim, const pm_ray *ray);
+} pm_hit_test;
+
+/* Whether a candidate hit counts; ray->tfar is the candidate's t. A rejected one lets the ray go on. */
+typedef bool (*pm_filter)(const void *user, const pm_ray *ray, const pm_scene_hit *candidate);
+
+/* `message` is valid during the call only. */
+typedef void (*pm_error_function)(const void *user, int code, const char *message);
+
+/* `bytes` are (post) or are about to be (!post) allocated, or freed when negative. False refuses. */
+typedef bool (*pm_memory_function)(const void *user, int64_t bytes, bool post);
+
+/* Device ------------------------------------------------------------------------------------------ */
+
+/* RTC_VERSION of the headers: major * 10000 + minor * 100 + patch. */
+uint32_t pm_version_of_headers(void);
+
+/* NULL on failure, with the reason in *error. `config` as for rtcNewDevice. `user` must outlive the
+ * device and all that was made from it. */
+pm_device *pm_device_new(const char *config, const void *user, pm_error_function on_error,
+                         pm_memory_function on_memory, int *error);
+void pm_device_free(pm_device *device);
+/* Of the library that is loaded, in the form of pm_version_of_headers. */
+uint32_t pm_device_version(const pm_device *device);
+/* Whether the library was built with ray masks and with filter functions. */
+bool pm_device_has_masks(const pm_device *device);
+bool pm_device_has_filters(const pm_device *device);
+
+/* Geometry ---------------------------------------------------------------------------------------- */
+
+/* All return NULL on failure. A new geometry is seen by every ray (mask of all bits).
+ * A geometry must be freed after the scenes it was attached to: Embree calls it until then. */
+pm_geometry *pm_geometry_new_user(const pm_device *device, const pm_hit_test *test, const void *user,
+                                  uint32_t primitives);
+/* Both arrays are shared, not copied: vertices as x y z with 4 readable bytes after the last one. */
+pm_geometry *pm_geometry_new_triangles(const pm_device *device, const float *vertices, uint32_t vertex_count,
+                                       const uint32_t *indices, uint32_t triangle_count);
+/* `transform`: object to world, 4 columns of 3. */
+pm_geometry *pm_geometry_new_instance(const pm_device *device, pm_scene *scene, const float transform[12]);
+void pm_geometry_free(pm_geometry *geometry);
+
+/* Another test for a user geometry. */
+void pm_geometry_set_test(pm_geometry *geometry, const pm_hit_test *test, const void *user, uint32_t primitives);
+void pm_geometry_set_mask(pm_geometry *geometry, uint32_t mask);
+/* Sets the intersection and the occlusion filter; not for instances. */
+void pm_geometry_set_filter(pm_geometry *geometry, pm_filter filter, const void *user);
+void pm_geometry_set_quality(pm_geometry *geometry, int quality);
+/* Ends every change; needed before the commit of the scene. */
+void pm_geometry_commit(pm_geometry *geometry);
+
+/* Scene ------------------------------------------------------------------------------------------- */
+
+pm_scene *pm_scene_new(const pm_device *device, int quality, int flags);
+void pm_scene_free(pm_scene *scene);
+void pm_scene_attach(pm_scene *scene, pm_geometry *geometry, uint32_t id);
+void pm_scene_commit(pm_scene *scene);
+/* min x y z, max x y z of a committed scene; inverted when it is empty. */
+void pm_scene_bounds(const pm_scene *scene, float out[6]);
+
+/* Both ask a committed scene, from any number of threads. */
+bool pm_intersect1(const pm_scene *scene, const pm_ray *ray, pm_scene_hit *hit);
+bool pm_occluded1(const pm_scene *scene, const pm_ray *ray);
+
+#endif

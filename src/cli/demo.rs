@@ -1,0 +1,96 @@
+//! `prismarch demo`: writes a ready scene and renders it.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use super::engine::EngineArgs;
+use super::error::CliError;
+use super::picture::Target;
+use super::render::{FilmArgs, Job};
+use crate::demo::{DEMOS, Demo};
+
+/// Make a ready scene and a picture of it
+///
+/// Mesh, displacement map, colours and scene file are made by the program itself and written into a folder, then the
+/// scene is rendered. All files are there to be changed and rendered again with `prismarch render`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  prismarch demo
+  prismarch demo --list
+  prismarch demo chainmail --out chainmail --size 1280x960 --spp 64
+  prismarch demo orb --no-render")]
+pub struct Args {
+    /// Which one; --list tells them all
+    #[arg(default_value = "asteroid")]
+    name: String,
+    /// Folder for the files, made if it is missing [default: NAME]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// List the demos
+    #[arg(long)]
+    list: bool,
+    /// Write the scene, but render nothing
+    #[arg(long)]
+    no_render: bool,
+    #[command(flatten)]
+    film: FilmArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
+    /// Print errors and warnings only
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Runs the verb.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    if args.list {
+        return list();
+    }
+    let demo = find(&args.name)?;
+    args.engine.check_backend()?;
+    args.engine.start_threads()?;
+    let folder = args.out.clone().unwrap_or_else(|| demo.name.into());
+    if !args.quiet {
+        eprintln!("making {} in {}", demo.name, folder.display());
+    }
+    let scene = demo.write(&folder)?;
+    if args.no_render {
+        return writeln!(std::io::stdout(), "{}", scene.display()).map_err(CliError::stdout);
+    }
+    Job {
+        target: Target::new(&scene.with_extension("png"))?,
+        scene: &scene,
+        film: &args.film,
+        stats: None,
+        engine: &args.engine,
+        quiet: args.quiet,
+    }
+    .run()
+}
+
+fn find(name: &str) -> Result<&'static Demo, CliError> {
+    crate::demo::find(name).ok_or_else(|| {
+        let names: Vec<_> = DEMOS.iter().map(|demo| demo.name).collect();
+        let names = names.join(", ");
+        CliError::Usage(format!("there is no demo {name:?}; expected one of {names}"))
+    })
+}
+
+fn list() -> Result<(), CliError> {
+    let mut table = String::new();
+    for demo in DEMOS {
+        let Demo {
+            name,
+            title,
+            triangles,
+            map_size,
+            ..
+        } = demo;
+        let map = format!("{map_size}x{map_size}");
+        table += &format!("{name:10} {triangles:>6} triangles, map {map:9}  {title}\n");
+    }
+    std::io::stdout()
+        .write_all(table.as_bytes())
+        .map_err(CliError::stdout)
+}

@@ -1,0 +1,96 @@
+//! What ends a run, and with which exit code.
+
+use std::io;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use super::rays::RayError;
+use crate::demo::WriteDemoError;
+use crate::image::OutputError;
+use crate::prism::MarchError;
+use crate::scene::{AssetError, SceneError};
+
+/// Exit code of wrong usage; clap's own.
+pub const USAGE: u8 = 2;
+const FAILED: u8 = 1;
+const INPUT: u8 = 3;
+const OUTPUT: u8 = 4;
+
+/// What ends a run.
+#[derive(Debug, Error)]
+pub enum CliError {
+    /// The command line asks for what cannot be.
+    #[error("{0}")]
+    Usage(String),
+    /// A scene file, or what it names.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A file named on the command line.
+    #[error(transparent)]
+    Asset(#[from] AssetError),
+    /// How a surface is to be marched.
+    #[error(transparent)]
+    March(#[from] MarchError),
+    /// The ray table.
+    #[error(transparent)]
+    Rays(#[from] RayError),
+    /// The backend cannot build or trace this world.
+    #[error("{backend}: {reason}")]
+    Backend {
+        /// Which one.
+        backend: &'static str,
+        /// What it says.
+        reason: String,
+    },
+    /// The threads could not be started.
+    #[error("cannot start {threads} threads: {source}")]
+    Threads {
+        /// How many.
+        threads: usize,
+        /// Why.
+        source: rayon::ThreadPoolBuildError,
+    },
+    /// A file could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The ending of the output is that of no known picture format.
+    #[error("cannot write {}: found {found}; expected a name that ends in .png or .exr", path.display())]
+    PictureFormat {
+        /// The path as given.
+        path: PathBuf,
+        /// Its ending.
+        found: String,
+    },
+    /// A demo's files.
+    #[error(transparent)]
+    Demo(#[from] WriteDemoError),
+    /// Standard output could not be written.
+    #[error("cannot write standard output: {0}")]
+    Stdout(io::Error),
+    /// Whoever read our standard output has stopped: a quiet end.
+    #[error("the reader of standard output is gone")]
+    ReaderGone,
+}
+
+impl CliError {
+    /// What the process ends with.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) | Self::PictureFormat { .. } => USAGE,
+            Self::Scene(_) | Self::Asset(_) | Self::March(_) | Self::Rays(_) => INPUT,
+            Self::Backend { .. } | Self::Threads { .. } => FAILED,
+            Self::Output(_) | Self::Demo(_) | Self::Stdout(_) => OUTPUT,
+            Self::ReaderGone => 0,
+        }
+    }
+
+    /// An error of writing standard output.
+    pub fn stdout(error: io::Error) -> Self {
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            Self::ReaderGone
+        } else {
+            Self::Stdout(error)
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Memory by part, divided as in the paper's table: what any method needs, and what this one adds.
+
+use serde::Serialize;
+
+use crate::scene::{Color, Light, Loaded, ObjectShape};
+use crate::trace::{Shape, Tracer, World};
+
+/// Bytes by part.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Memory {
+    /// What every method that displaces needs.
+    pub common: Common,
+    /// What this method adds.
+    pub overhead: Overhead,
+    /// Common parts and overhead.
+    pub total: usize,
+    /// Overhead in percent of the total.
+    pub overhead_percent: f64,
+    /// Colour textures and environments, which are not counted above.
+    pub pictures: usize,
+}
+
+/// Bytes that every method needs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Common {
+    /// Displacement maps.
+    pub maps: usize,
+    /// Base meshes.
+    pub meshes: usize,
+    /// The backend's acceleration structure.
+    pub bvh: usize,
+}
+
+/// Bytes that this method adds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Overhead {
+    /// Prisms, 108 bytes per base triangle.
+    pub prisms: usize,
+}
+
+impl Memory {
+    /// Adds up a built scene; what is shared counts once.
+    pub fn of(loaded: &Loaded, world: &World, tracer: &dyn Tracer) -> Self {
+        let common = Common {
+            maps: loaded.maps.iter().map(|m| m.map.bytes()).sum(),
+            meshes: mesh_bytes(loaded),
+            bvh: tracer.bvh_bytes(),
+        };
+        let prisms = world.objects().iter().map(|object| match &object.shape {
+            Shape::Displaced(prisms) => prisms.bytes(),
+            Shape::Triangles(_) => 0,
+        });
+        let overhead = Overhead {
+            prisms: prisms.sum(),
+        };
+        let total = common.maps + common.meshes + common.bvh + overhead.prisms;
+        Self {
+            // Not 0: a scene has a mesh.
+            overhead_percent: 100.0 * overhead.prisms as f64 / total as f64,
+            common,
+            overhead,
+            total,
+            pictures: picture_bytes(loaded),
+        }
+    }
+}
+
+fn mesh_bytes(loaded: &Loaded) -> usize {
+    let meshes = loaded.scene.objects.iter().map(|object| match &object.shape {
+        ObjectShape::Displaced(surface, _) => surface.mesh(),
+        ObjectShape::Plain(mesh) => mesh,
+    });
+    meshes.map(|mesh| mesh.bytes()).sum()
+}
+
+fn picture_bytes(loaded: &Loaded) -> usize {
+    let textures = loaded.scene.materials.iter().filter_map(|m| match &m.base_color {
+        Color::Texture(t) => Some((t.image.as_ref() as *const _ as usize, t.image.bytes())),
+        Color::Constant(_) => None,
+    });
+    let environments = loaded.scene.lights.iter().filter_map(|light| match light {
+        Light::Environment { image, .. } => {
+            let bytes = size_of_val(&image.pixels[..]);
+            Some((image.as_ref() as *const _ as usize, bytes))
+        }
+        Light::Sun { .. } | Light::Sky { .. } => None,
+    });
+    let mut by_address: Vec<(usize, usize)> = textures.chain(environments).collect();
+    by_address.sort_unstable();
+    by_address.dedup();
+    by_address.iter().map(|(_, bytes)| bytes).sum()
+}

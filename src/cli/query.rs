@@ -1,0 +1,276 @@
+//! `prismarch query`: rays from a table, hits to a table.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use csv::ByteRecord;
+use rayon::prelude::*;
+
+use super::engine::{Engine, EngineArgs};
+use super::error::CliError;
+use super::hits;
+use super::parse;
+use super::rays::{Layout, RayError, RayReader};
+use crate::image::{Channel, atomic};
+use crate::prism::{March, Step};
+use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
+use crate::surface::{Displacement, UvTransform, Wrap};
+use crate::trace::World;
+
+/// Trace rays from a CSV table and write their hits
+///
+/// RAYS.csv has the columns ox,oy,oz,dx,dy,dz and perhaps tnear,tfar (tfar may be inf). HITS.csv gets one row per ray, in
+/// order: hit,t,mesh,prim,u,v,px,py,pz,ngx,ngy,ngz,nsx,nsy,nsz,displacement. t is in lengths of the direction as given;
+/// p, ng (geometric normal) and ns (smooth normal) are in world space; a ray that hits nothing has zeros. `-` is
+/// standard input or output.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  prismarch query --mesh rock.obj --map rock.png --scale 0.1 --rays rays.csv -o hits.csv
+  prismarch query --mesh rock.obj --map rock.png --scale 0.1 --dt 0.25 --rays rays.csv -o hits.csv
+  zcat rays.csv.gz | prismarch query scene.toml --rays - -o - | gzip > hits.csv.gz")]
+pub struct Args {
+    /// Scene file (TOML), instead of --mesh and --map
+    #[arg(required_unless_present = "mesh", conflicts_with = "mesh")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    surface: SurfaceArgs,
+    /// How the surface is looked for inside a prism [default: the scene's, or uniform]
+    #[arg(long, value_enum)]
+    march: Option<MarchKind>,
+    /// Step of the uniform march in texels of the map [default: the scene's, or 1]
+    #[arg(long, value_name = "TEXELS", value_parser = parse::texels)]
+    dt: Option<f32>,
+    /// Step of the uniform march in world units
+    #[arg(long, value_name = "LENGTH", value_parser = parse::length, conflicts_with = "dt")]
+    dt_world: Option<f32>,
+    /// Shift the steps of each ray at random (thin-feature sampling)
+    #[arg(long, value_name = "SEED")]
+    jitter: Option<u32>,
+    /// Table of rays, - for standard input
+    #[arg(long, value_name = "RAYS.csv")]
+    rays: PathBuf,
+    /// Table of hits, - for standard output
+    #[arg(short, long, value_name = "HITS.csv", default_value = "-")]
+    output: PathBuf,
+    #[command(flatten)]
+    engine: EngineArgs,
+}
+
+/// One displaced mesh without a scene file.
+#[derive(Debug, clap::Args)]
+struct SurfaceArgs {
+    /// Mesh file: .obj, .gltf, .glb or .ply
+    #[arg(long, value_name = "FILE", requires_all = ["map", "scale"])]
+    mesh: Option<PathBuf>,
+    /// Displacement map: PNG, TIFF, EXR, JPEG
+    #[arg(long, value_name = "FILE", requires = "mesh")]
+    map: Option<PathBuf>,
+    /// World units from height 0 to height 1 of the map
+    #[arg(long, value_name = "S", value_parser = parse::scale, allow_hyphen_values = true, requires = "mesh")]
+    scale: Option<f32>,
+    /// Height that stays on the mesh
+    #[arg(long, value_name = "X", value_parser = parse::finite, allow_hyphen_values = true, default_value_t = 0.0, requires = "mesh")]
+    midlevel: f32,
+    /// Channel of the map: luminance, r, g, b, a or the name of an EXR channel
+    #[arg(long, value_name = "C", default_value = "luminance", requires = "mesh")]
+    channel: String,
+    /// The map outside of [0, 1]
+    #[arg(long, value_enum, default_value_t = WrapKind::Repeat, requires = "mesh")]
+    wrap: WrapKind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MarchKind {
+    /// Equal steps along the ray, as in the paper
+    Uniform,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum WrapKind {
+    Repeat,
+    Clamp,
+    Mirror,
+}
+
+impl From<WrapKind> for Wrap {
+    fn from(kind: WrapKind) -> Self {
+        match kind {
+            WrapKind::Repeat => Self::Repeat,
+            WrapKind::Clamp => Self::Clamp,
+            WrapKind::Mirror => Self::Mirror,
+        }
+    }
+}
+
+/// Runs the verb.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    args.engine.check_backend()?;
+    let to_stdout = args.output == Path::new("-");
+    if !to_stdout {
+        atomic::check(&args.output)?;
+    }
+    args.engine.start_threads()?;
+    let mut rays = RayReader::open(&args.rays)?;
+    let mut loaded = args.load()?;
+    super::warn(&loaded.warnings);
+    args.override_march(&mut loaded.scene);
+    let world = loaded.scene.world()?;
+    let engine = args.engine.build(&world)?;
+    let query = Query {
+        world: &world,
+        engine: &*engine,
+        seed: args.jitter.unwrap_or(0),
+    };
+    if to_stdout {
+        let mut out = BufWriter::new(io::stdout().lock());
+        return query.run(&mut rays, &mut out).map_err(|stop| match stop {
+            Stop::Because(error) => error,
+            Stop::Write(error) => CliError::stdout(error),
+        });
+    }
+    let mut because = None;
+    let written = atomic::write(&args.output, |out| {
+        query.run(&mut rays, out).map_err(|stop| match stop {
+            Stop::Write(error) => error,
+            Stop::Because(error) => {
+                because = Some(error);
+                io::Error::other("stopped")
+            }
+        })
+    });
+    match because {
+        Some(error) => Err(error),
+        None => Ok(written?),
+    }
+}
+
+impl Args {
+    fn load(&self) -> Result<Loaded, CliError> {
+        let SurfaceArgs {
+            mesh, map, scale, ..
+        } = &self.surface;
+        match (&self.scene, mesh, map, scale) {
+            (Some(scene), ..) => Ok(Loaded::from_file(scene)?),
+            (None, Some(mesh), Some(map), &Some(scale)) => {
+                let Ok(channel): Result<Channel, _> = self.surface.channel.parse();
+                Ok(Loaded::from_mesh_and_map(&MeshAndMap {
+                    mesh: mesh.clone(),
+                    map: map.clone(),
+                    channel,
+                    wrap: self.surface.wrap.into(),
+                    displacement: Displacement {
+                        scale,
+                        midlevel: self.surface.midlevel,
+                        uv: UvTransform::default(),
+                    },
+                    march: March::Uniform {
+                        step: Step::Texels(1.0),
+                        jitter: false,
+                    },
+                })?)
+            }
+            _ => Err(CliError::Usage(
+                "either SCENE or --mesh, --map and --scale are needed".into(),
+            )),
+        }
+    }
+
+    /// What the command line says of the march wins over the scene.
+    fn override_march(&self, scene: &mut Scene) {
+        let step_here = match (self.dt, self.dt_world) {
+            (Some(texels), _) => Some(Step::Texels(texels)),
+            (None, Some(length)) => Some(Step::World(length)),
+            (None, None) => None,
+        };
+        for object in &mut scene.objects {
+            let ObjectShape::Displaced(_, march) = &mut object.shape else {
+                continue;
+            };
+            let March::Uniform { step, jitter } = march;
+            *step = step_here.unwrap_or(*step);
+            *jitter |= self.jitter.is_some();
+        }
+    }
+}
+
+/// Rays traced at once: enough for all threads, little memory.
+const CHUNK: usize = 1 << 16;
+
+struct Query<'a> {
+    world: &'a World,
+    engine: &'a dyn Engine,
+    seed: u32,
+}
+
+/// Why a table of hits ends early.
+enum Stop {
+    Write(io::Error),
+    Because(CliError),
+}
+
+impl Query<'_> {
+    /// Traces all rays, chunk by chunk.
+    fn run(&self, rays: &mut RayReader, out: &mut impl Write) -> Result<(), Stop> {
+        let mut rows = vec![ByteRecord::new(); CHUNK];
+        let mut first = 0;
+        out.write_all(hits::HEADER.as_bytes()).map_err(Stop::Write)?;
+        loop {
+            let count = rays.read(&mut rows).map_err(|e| Stop::Because(e.into()))?;
+            let tables = self
+                .trace(&rows[..count], first, rays.layout())
+                .map_err(|e| Stop::Because(e.into()))?;
+            self.engine.check().map_err(Stop::Because)?;
+            for table in tables {
+                out.write_all(&table).map_err(Stop::Write)?;
+            }
+            first += count as u64;
+            if count < rows.len() {
+                return out.flush().map_err(Stop::Write);
+            }
+        }
+    }
+
+    /// The hits of these rows, in order and in pieces; the first bad row is the error.
+    fn trace(
+        &self,
+        rows: &[ByteRecord],
+        first: u64,
+        layout: &Layout,
+    ) -> Result<Vec<Vec<u8>>, RayError> {
+        const PIECE: usize = 1 << 10;
+        let pieces = rows.par_chunks(PIECE).enumerate();
+        let traced: Vec<Result<Vec<u8>, RayError>> = pieces
+            .map(|(index, piece)| {
+                let first = first + (index * PIECE) as u64;
+                self.trace_piece(piece, first, layout)
+            })
+            .collect();
+        traced.into_iter().collect()
+    }
+
+    fn trace_piece(
+        &self,
+        rows: &[ByteRecord],
+        first: u64,
+        layout: &Layout,
+    ) -> Result<Vec<u8>, RayError> {
+        let tracer = self.engine.tracer();
+        let mut table = Vec::new();
+        for (row, number) in rows.iter().zip(first..) {
+            let mut ray = layout.ray(row)?;
+            ray.key = key(self.seed, number);
+            hits::append(&mut table, self.world, tracer.intersect(&ray).as_ref());
+        }
+        Ok(table)
+    }
+}
+
+/// A ray's random key: Murmur3's finaliser over seed and row, so that neighbouring rows share nothing.
+fn key(seed: u32, row: u64) -> u32 {
+    let mut x = seed ^ (row as u32).wrapping_mul(0x9e37_79b9) ^ (row >> 32) as u32;
+    x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
+    x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
+    x ^ (x >> 16)
+}

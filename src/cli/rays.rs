@@ -1,0 +1,329 @@
+//! A table of rays: CSV with a header, columns in any order, `tnear` and `tfar` optional.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use csv::{ByteRecord, ReaderBuilder, Trim};
+use glam::Vec3;
+use thiserror::Error;
+
+use crate::ray::Ray;
+
+/// Columns that a table must have, then those it may have.
+const COLUMNS: [&str; 8] = ["ox", "oy", "oz", "dx", "dy", "dz", "tnear", "tfar"];
+const REQUIRED: usize = 6;
+
+/// Why a table of rays was refused.
+#[derive(Debug, Error)]
+pub enum RayError {
+    /// The file cannot be opened or read.
+    #[error("cannot read rays {file}: {source}")]
+    Read {
+        /// The file, `-` for standard input.
+        file: String,
+        /// Why.
+        source: io::Error,
+    },
+    /// The header lacks a column, repeats one or has one that means nothing.
+    #[error("{file}:1: found {found}; expected the columns ox,oy,oz,dx,dy,dz and perhaps tnear,tfar")]
+    Header {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        found: String,
+    },
+    /// A row with too few or too many fields.
+    #[error("{file}:{line}: found {found} fields; expected {expected}, as in the header")]
+    Fields {
+        /// The file.
+        file: String,
+        /// From 1; the header is the first.
+        line: u64,
+        /// Fields in the row.
+        found: usize,
+        /// Columns of the header.
+        expected: usize,
+    },
+    /// A value that does not fit.
+    #[error("{file}:{line}: {column}: found {found}; expected {expected}")]
+    Value {
+        /// The file.
+        file: String,
+        /// From 1; the header is the first.
+        line: u64,
+        /// The column, or the columns.
+        column: &'static str,
+        /// What the row has.
+        found: String,
+        /// What fits.
+        expected: &'static str,
+    },
+}
+
+/// Reads rays, many rows at a time.
+pub struct RayReader {
+    csv: csv::Reader<Box<dyn Read>>,
+    layout: Layout,
+}
+
+/// Where the columns are.
+#[derive(Debug)]
+pub struct Layout {
+    file: String,
+    columns: usize,
+    /// Per name in [`COLUMNS`] its index in a row.
+    index: [Option<usize>; 8],
+}
+
+impl RayReader {
+    /// Opens a file, or standard input for `-`, and reads the header.
+    pub fn open(path: &Path) -> Result<Self, RayError> {
+        let file = path.display().to_string();
+        let input: Box<dyn Read> = if path == Path::new("-") {
+            Box::new(io::stdin())
+        } else {
+            let opened = File::open(path).map_err(|source| RayError::Read {
+                file: file.clone(),
+                source,
+            })?;
+            Box::new(opened)
+        };
+        Self::new(file, input)
+    }
+
+    fn new(file: String, input: Box<dyn Read>) -> Result<Self, RayError> {
+        let mut csv = ReaderBuilder::new()
+            .has_headers(true)
+            .flexible(true) // rows of a wrong length get our own message
+            .quoting(false)
+            .trim(Trim::All)
+            .from_reader(input);
+        let header = csv
+            .byte_headers()
+            .map_err(|e| read_error(&file, e))?
+            .clone();
+        let layout = Layout::new(file, &header)?;
+        Ok(Self { csv, layout })
+    }
+
+    /// Where the columns are.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Fills `rows` from its start with the next rows; the number of rows read is less than its length only
+    /// at the end of the table.
+    pub fn read(&mut self, rows: &mut [ByteRecord]) -> Result<usize, RayError> {
+        for (done, row) in rows.iter_mut().enumerate() {
+            let more = self.csv.read_byte_record(row);
+            if !more.map_err(|e| read_error(&self.layout.file, e))? {
+                return Ok(done);
+            }
+        }
+        Ok(rows.len())
+    }
+}
+
+impl Layout {
+    fn new(file: String, header: &ByteRecord) -> Result<Self, RayError> {
+        let mut index = [None; 8];
+        let names: Vec<_> = header.iter().map(String::from_utf8_lossy).collect();
+        for (position, name) in names.iter().enumerate() {
+            let slot = COLUMNS.iter().position(|column| column == name);
+            let found = match slot {
+                Some(slot) if index[slot].is_none() => {
+                    index[slot] = Some(position);
+                    continue;
+                }
+                Some(_) => format!("the column {name} twice"),
+                None if header.len() == 1 => format!("the single column {name:?}"),
+                None => format!("the column {name:?}"),
+            };
+            return Err(RayError::Header { file, found });
+        }
+        if let Some(missing) = (0..REQUIRED).find(|&slot| index[slot].is_none()) {
+            let found = format!("no column {}", COLUMNS[missing]);
+            return Err(RayError::Header { file, found });
+        }
+        Ok(Self {
+            file,
+            columns: header.len(),
+            index,
+        })
+    }
+
+    /// The ray of one row.
+    pub fn ray(&self, row: &ByteRecord) -> Result<Ray, RayError> {
+        if row.len() != self.columns {
+            return Err(RayError::Fields {
+                file: self.file.clone(),
+                line: line(row),
+                found: row.len(),
+                expected: self.columns,
+            });
+        }
+        let mut origin = [0.0; 3];
+        let mut direction = [0.0; 3];
+        for axis in 0..3 {
+            origin[axis] = self.finite(row, axis)?;
+            direction[axis] = self.finite(row, 3 + axis)?;
+        }
+        let [dx, dy, dz] = direction;
+        if direction == [0.0; 3] {
+            let found = format!("{dx},{dy},{dz}");
+            return Err(self.value(row, "dx,dy,dz", found, "a direction that is not zero"));
+        }
+        let (tnear, tfar) = self.interval(row)?;
+        Ok(Ray {
+            tnear,
+            tfar,
+            ..Ray::new(origin.into(), Vec3::new(dx, dy, dz))
+        })
+    }
+
+    /// `tnear` and `tfar`; 0 and infinity where the column is missing or its field empty.
+    fn interval(&self, row: &ByteRecord) -> Result<(f32, f32), RayError> {
+        let [near, far] = [6, 7];
+        let tnear = match self.field(row, near) {
+            b"" => 0.0,
+            _ => self.finite(row, near)?,
+        };
+        if tnear < 0.0 {
+            let found = tnear.to_string();
+            return Err(self.value(row, COLUMNS[near], found, "a number of at least 0"));
+        }
+        let text = self.field(row, far);
+        let tfar = match text {
+            b"" => Some(f32::INFINITY),
+            _ => number(text),
+        };
+        match tfar.filter(|&t| t >= tnear) {
+            Some(tfar) => Ok((tnear, tfar)),
+            None => {
+                let expected = "a number of at least tnear, or inf";
+                Err(self.value(row, COLUMNS[far], show(text), expected))
+            }
+        }
+    }
+
+    fn finite(&self, row: &ByteRecord, column: usize) -> Result<f32, RayError> {
+        let text = self.field(row, column);
+        number(text)
+            .filter(|x| x.is_finite())
+            .ok_or_else(|| self.value(row, COLUMNS[column], show(text), "a finite number"))
+    }
+
+    /// The field of a column; empty where the table has no such column.
+    fn field<'r>(&self, row: &'r ByteRecord, column: usize) -> &'r [u8] {
+        self.index[column]
+            .and_then(|i| row.get(i))
+            .unwrap_or_default()
+    }
+
+    fn value(
+        &self,
+        row: &ByteRecord,
+        column: &'static str,
+        found: String,
+        expected: &'static str,
+    ) -> RayError {
+        RayError::Value {
+            file: self.file.clone(),
+            line: line(row),
+            column,
+            found,
+            expected,
+        }
+    }
+}
+
+fn number(text: &[u8]) -> Option<f32> {
+    std::str::from_utf8(text).ok()?.parse().ok()
+}
+
+fn show(text: &[u8]) -> String {
+    match text {
+        b"" => "nothing".into(),
+        _ => String::from_utf8_lossy(&text[..text.len().min(60)]).into_owned(),
+    }
+}
+
+fn line(row: &ByteRecord) -> u64 {
+    row.position().map_or(0, csv::Position::line)
+}
+
+fn read_error(file: &str, error: csv::Error) -> RayError {
+    RayError::Read {
+        file: file.to_owned(),
+        source: error.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(table: &'static str) -> Result<Vec<Ray>, RayError> {
+        let mut reader = RayReader::new("rays.csv".into(), Box::new(table.as_bytes()))?;
+        let mut rows = vec![ByteRecord::new(); 3];
+        let mut rays = Vec::new();
+        loop {
+            let count = reader.read(&mut rows)?;
+            for row in &rows[..count] {
+                rays.push(reader.layout().ray(row)?);
+            }
+            if count < rows.len() {
+                return Ok(rays);
+            }
+        }
+    }
+
+    fn refusal(table: &'static str) -> String {
+        read(table).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn columns_come_in_any_order_and_the_interval_is_optional() {
+        let rays = read("dx,dy,dz,ox,oy,oz\n0,0,-2, 1,2,3\r\n\n1e-3,0,0,-1,0,0.5\n").unwrap();
+        assert_eq!(rays[0], Ray::new(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.0, -2.0)));
+        assert_eq!(rays[1].direction.x, 1e-3);
+        assert_eq!(rays.len(), 2);
+        let rays = read("tfar,ox,oy,oz,dx,dy,dz,tnear\n,0,0,0,1,0,0,\ninf,0,0,0,1,0,0,2\n7,0,0,0,1,0,0,7").unwrap();
+        let intervals: Vec<_> = rays.iter().map(|r| (r.tnear, r.tfar)).collect();
+        assert_eq!(intervals, [(0.0, f32::INFINITY), (2.0, f32::INFINITY), (7.0, 7.0)]);
+    }
+
+    #[test]
+    fn a_table_without_rows_is_no_error() {
+        assert_eq!(read("ox,oy,oz,dx,dy,dz").unwrap(), []);
+    }
+
+    #[test]
+    fn headers_must_fit() {
+        assert!(refusal("ox,oy,oz,dx,dy\n").contains("no column dz"));
+        assert!(refusal("").contains("rays.csv:1: found no column ox"));
+        assert!(refusal("ox,oy,oz,dx,dy,dz,time\n").contains("\"time\""));
+        assert!(refusal("ox,ox,oy,oz,dx,dy,dz\n").contains("ox twice"));
+    }
+
+    #[test]
+    fn bad_values_are_named_with_line_and_column() {
+        let cases = [
+            ("ox,oy,oz,dx,dy,dz\n0,0,0,1,0,0\n0,0,0,0,-0,0\n", ":3: dx,dy,dz: found 0,-0,0"),
+            ("ox,oy,oz,dx,dy,dz\n0,0,0,nan,0,0\n", ":2: dx: found nan"),
+            ("ox,oy,oz,dx,dy,dz\n0,0,0,1,-inf,0\n", ":2: dy: found -inf"),
+            ("ox,oy,oz,dx,dy,dz\n0,0,0,1,1e99,0\n", ":2: dy: found 1e99"),
+            ("ox,oy,oz,dx,dy,dz\n\n0,zero,0,1,0,0\n", ":3: oy: found zero"),
+            ("ox,oy,oz,dx,dy,dz\n0,,0,1,0,0\n", ":2: oy: found nothing"),
+            ("ox,oy,oz,dx,dy,dz\n0,0,1,0,0\n", ":2: found 5 fields; expected 6"),
+            ("ox,oy,oz,dx,dy,dz,tnear\n0,0,0,1,0,0,-1\n", ":2: tnear: found -1"),
+            ("ox,oy,oz,dx,dy,dz,tfar\n0,0,0,1,0,0,nan\n", ":2: tfar: found nan"),
+            ("ox,oy,oz,dx,dy,dz,tnear,tfar\n0,0,0,1,0,0,2,1\n", ":2: tfar: found 1"),
+        ];
+        for (table, expected) in cases {
+            let message = refusal(table);
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}

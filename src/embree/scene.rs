@@ -1,0 +1,355 @@
+//! Scenes: built, committed, traced; reopened to be changed.
+
+use std::ptr::NonNull;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::geometry::{Kind, count};
+use super::{Device, EmbreeError, Geometry, HitTest, Instance, Prototype, sys};
+use crate::ray::{Aabb, Ray};
+use crate::trace::{Hit, MAX_INSTANCE_LEVELS};
+
+const _: () = assert!(MAX_INSTANCE_LEVELS == sys::PM_INSTANCE_LEVELS as usize);
+
+/// Build time against tracing speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BuildQuality {
+    /// Fast builds. A geometry that changes is refitted instead of rebuilt, and nothing else is touched: for edits.
+    Low,
+    /// Between.
+    #[default]
+    Medium,
+    /// Fast rays.
+    High,
+}
+
+/// How a scene is built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SceneOptions {
+    /// Build time against tracing speed.
+    pub quality: BuildQuality,
+    /// Better for scenes that change often.
+    pub dynamic: bool,
+    /// Less memory, slower.
+    pub compact: bool,
+    /// No ray slips through between triangles; user geometries are not touched by this.
+    pub robust: bool,
+}
+
+impl SceneOptions {
+    fn flags(self) -> u32 {
+        [
+            (self.dynamic, sys::PM_SCENE_DYNAMIC),
+            (self.compact, sys::PM_SCENE_COMPACT),
+            (self.robust, sys::PM_SCENE_ROBUST),
+        ]
+        .into_iter()
+        .map(|(on, flag)| if on { flag } else { 0 })
+        .sum()
+    }
+
+    fn raw_quality(self) -> u32 {
+        match self.quality {
+            BuildQuality::Low => sys::PM_QUALITY_LOW,
+            BuildQuality::Medium => sys::PM_QUALITY_MEDIUM,
+            BuildQuality::High => sys::PM_QUALITY_HIGH,
+        }
+    }
+}
+
+struct RawScene(NonNull<sys::pm_scene>);
+
+impl Drop for RawScene {
+    fn drop(&mut self) {
+        // SAFETY: made by pm_scene_new, freed once.
+        unsafe { sys::pm_scene_free(self.0.as_ptr()) }
+    }
+}
+
+/// A scene that can be changed but not traced.
+pub struct SceneBuilder {
+    // Dropped in this order: Embree calls nothing of a geometry once the scene is gone, and reads nothing of a
+    // prototype once its instances are.
+    raw: RawScene,
+    geometries: Vec<Geometry>,
+    prototypes: Vec<Scene>,
+    /// Prototypes to be built again by the next commit; each is in range.
+    edited: Vec<u32>,
+    options: SceneOptions,
+    device: Device,
+}
+
+// SAFETY: the scene is used by one thread at a time; what it owns is Send.
+unsafe impl Send for SceneBuilder {}
+
+impl SceneBuilder {
+    /// An empty scene.
+    pub fn new(device: &Device, options: SceneOptions) -> Result<Self, EmbreeError> {
+        // SAFETY: a live device.
+        let raw = device.guarded(|| unsafe {
+            // Qualities and flags are small enumerators.
+            sys::pm_scene_new(
+                device.raw(),
+                options.raw_quality() as i32,
+                options.flags() as i32,
+            )
+        })?;
+        let raw = NonNull::new(raw).ok_or_else(|| EmbreeError::Library {
+            code: super::ErrorCode::Unknown,
+            message: "no scene was made".to_string(),
+        })?;
+        Ok(Self {
+            raw: RawScene(raw),
+            geometries: Vec::new(),
+            prototypes: Vec::new(),
+            edited: Vec::new(),
+            options,
+            device: device.clone(),
+        })
+    }
+
+    /// Adds a geometry; ids count up from 0.
+    pub fn attach(&mut self, geometry: impl Into<Geometry>) -> Result<u32, EmbreeError> {
+        let mut geometry = geometry.into();
+        let id = count("geometries", self.geometries.len())?;
+        if self.options.quality == BuildQuality::Low && geometry.kind == Kind::User {
+            // SAFETY: a live geometry that no scene has yet.
+            unsafe { sys::pm_geometry_set_quality(geometry.raw(), sys::PM_QUALITY_REFIT as i32) };
+        }
+        geometry.commit()?;
+        // SAFETY: both live; the geometry is dropped after the scene.
+        let attached = self
+            .device
+            .guarded(|| unsafe { sys::pm_scene_attach(self.raw.0.as_ptr(), geometry.raw(), id) });
+        attached?;
+        self.geometries.push(geometry);
+        Ok(id)
+    }
+
+    /// Takes a scene in order to instance it. One level: `scene` must not have prototypes of its own.
+    pub fn add_prototype(&mut self, scene: Scene) -> Result<Prototype, EmbreeError> {
+        if !scene.0.prototypes.is_empty() {
+            return Err(EmbreeError::NestedInstances);
+        }
+        let id = count("prototypes", self.prototypes.len())?;
+        self.prototypes.push(scene);
+        Ok(Prototype(id))
+    }
+
+    /// Adds an instance of one of this scene's prototypes; ids are those of [`attach`](Self::attach).
+    pub fn attach_instance(&mut self, instance: &Instance) -> Result<u32, EmbreeError> {
+        let id = instance.prototype.0;
+        let scene = self
+            .prototypes
+            .get(id as usize)
+            .ok_or(EmbreeError::NotInScene {
+                what: "prototype",
+                id,
+            })?;
+        // SAFETY: prototypes are dropped after geometries, and edited in place only.
+        let geometry = unsafe { instance.geometry(&self.device, scene) }?;
+        self.attach(geometry)
+    }
+
+    /// Gives user geometry `id` another hit test. With as many primitives as before and
+    /// [`BuildQuality::Low`] the next commit refits.
+    pub fn replace<T: HitTest + 'static>(
+        &mut self,
+        id: u32,
+        test: Arc<T>,
+    ) -> Result<(), EmbreeError> {
+        self.edit().replace(id, test)
+    }
+
+    /// Tells that the bounds of user geometry `id` have changed.
+    pub fn changed(&mut self, id: u32) -> Result<(), EmbreeError> {
+        self.edit().changed(id)
+    }
+
+    fn edit(&mut self) -> SceneEdit<'_> {
+        SceneEdit {
+            geometries: &mut self.geometries,
+        }
+    }
+
+    /// A prototype, to be edited; the next commit builds it again and its instances follow.
+    pub fn prototype_mut(&mut self, prototype: Prototype) -> Result<SceneEdit<'_>, EmbreeError> {
+        let id = prototype.0;
+        let scene = self
+            .prototypes
+            .get_mut(id as usize)
+            .ok_or(EmbreeError::NotInScene {
+                what: "prototype",
+                id,
+            })?;
+        self.edited.push(id);
+        Ok(scene.0.edit())
+    }
+
+    /// Builds. Runs outside rayon's pool, whose threads Embree's would fight for the cores.
+    pub fn commit(mut self) -> Result<Scene, EmbreeError> {
+        self.commit_in_place()?;
+        Ok(Scene(self))
+    }
+
+    fn commit_in_place(&mut self) -> Result<(), EmbreeError> {
+        if rayon::current_thread_index().is_none() {
+            return self.commit_here();
+        }
+        std::thread::scope(|scope| {
+            scope
+                .spawn(|| self.commit_here())
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
+
+    fn commit_here(&mut self) -> Result<(), EmbreeError> {
+        for id in std::mem::take(&mut self.edited) {
+            self.prototypes[id as usize].0.commit_here()?;
+            let kind = Kind::Instance { prototype: id };
+            for instance in self.geometries.iter_mut().filter(|g| g.kind == kind) {
+                instance.commit()?;
+            }
+        }
+        // SAFETY: a live scene, exclusively borrowed: nobody traces it.
+        self.device
+            .guarded(|| unsafe { sys::pm_scene_commit(self.raw.0.as_ptr()) })?;
+        self.device.check()
+    }
+}
+
+/// The part of a scene that can change in place: the hit tests of its user geometries.
+pub struct SceneEdit<'s> {
+    geometries: &'s mut [Geometry],
+}
+
+impl SceneEdit<'_> {
+    /// As [`SceneBuilder::replace`].
+    pub fn replace<T: HitTest + 'static>(
+        &mut self,
+        id: u32,
+        test: Arc<T>,
+    ) -> Result<(), EmbreeError> {
+        let geometry = self.user_geometry(id)?;
+        geometry.replace_test(test)?;
+        geometry.commit()
+    }
+
+    /// As [`SceneBuilder::changed`].
+    pub fn changed(&mut self, id: u32) -> Result<(), EmbreeError> {
+        self.user_geometry(id)?.commit()
+    }
+
+    fn user_geometry(&mut self, id: u32) -> Result<&mut Geometry, EmbreeError> {
+        self.geometries
+            .get_mut(id as usize)
+            .filter(|g| g.kind == Kind::User)
+            .ok_or(EmbreeError::NotInScene {
+                what: "user geometry",
+                id,
+            })
+    }
+}
+
+/// A committed scene: traceable from any number of threads, and unchangeable.
+pub struct Scene(SceneBuilder);
+
+// SAFETY: Embree allows any number of threads to trace a committed scene, and nothing else is done through
+// `&Scene`; hit tests and filters are Sync.
+unsafe impl Sync for Scene {}
+
+impl Scene {
+    /// The same scene, to be changed and committed again.
+    pub fn reopen(self) -> SceneBuilder {
+        self.0
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Device {
+        &self.0.device
+    }
+
+    pub(super) fn raw(&self) -> *mut sys::pm_scene {
+        self.0.raw.0.as_ptr()
+    }
+
+    /// The box over everything; [`Aabb::EMPTY`] for an empty scene.
+    pub fn bounds(&self) -> Aabb {
+        let mut out = [0.0; 6];
+        // SAFETY: a live, committed scene; room for six floats.
+        unsafe { sys::pm_scene_bounds(self.raw(), out.as_mut_ptr()) };
+        let [x0, y0, z0, x1, y1, z1] = out;
+        let bounds = Aabb {
+            min: Vec3::new(x0, y0, z0),
+            max: Vec3::new(x1, y1, z1),
+        };
+        if bounds.is_valid() {
+            bounds
+        } else {
+            Aabb::EMPTY
+        }
+    }
+
+    /// The first hit with t in (tnear, tfar); none for a ray that is not [valid](Ray::is_valid).
+    pub fn intersect1(&self, ray: &Ray) -> Option<Hit> {
+        if !ray.is_valid() {
+            return None;
+        }
+        let mut hit = sys::pm_scene_hit {
+            at: sys::pm_hit {
+                t: 0.0,
+                u: 0.0,
+                v: 0.0,
+                ng: [0.0; 3],
+            },
+            prim: 0,
+            geom: 0,
+            inst: [0; MAX_INSTANCE_LEVELS],
+        };
+        // SAFETY: a live, committed scene; the shim reads the ray and writes the hit.
+        let found = unsafe { sys::pm_intersect1(self.raw(), &ray_to_raw(ray), &mut hit) };
+        found.then(|| hit_from_raw(&hit))
+    }
+
+    /// Whether there is any hit with t in (tnear, tfar).
+    pub fn occluded1(&self, ray: &Ray) -> bool {
+        // SAFETY: a live, committed scene; the shim reads the ray.
+        ray.is_valid() && unsafe { sys::pm_occluded1(self.raw(), &ray_to_raw(ray)) }
+    }
+}
+
+fn ray_to_raw(ray: &Ray) -> sys::pm_ray {
+    sys::pm_ray {
+        org: ray.origin.to_array(),
+        tnear: ray.tnear,
+        dir: ray.direction.to_array(),
+        time: 0.0,
+        tfar: ray.tfar,
+        mask: ray.mask,
+        id: ray.key,
+        flags: 0,
+    }
+}
+
+pub(super) fn hit_from_raw(hit: &sys::pm_scene_hit) -> Hit {
+    Hit {
+        t: hit.at.t,
+        u: hit.at.u,
+        v: hit.at.v,
+        prim: hit.prim,
+        geom: hit.geom,
+        inst: hit.inst,
+        ng: unit(Vec3::from_array(hit.at.ng)),
+    }
+}
+
+/// Hit tests give unit normals, which stay as they are bit for bit; triangles give twice their area.
+fn unit(n: Vec3) -> Vec3 {
+    if (n.length_squared() - 1.0).abs() <= 8.0 * f32::EPSILON {
+        return n;
+    }
+    // Scaled first: the square of a small triangle's normal underflows.
+    (n / n.abs().max_element()).normalize_or_zero()
+}

@@ -1,0 +1,195 @@
+//! User geometry: primitives whose boxes and hits are computed in Rust.
+//!
+//! Each call of Embree's passes one C function of the shim and one Rust function of [`HitTest`], stamped
+//! out per type; its pointer is stored when the geometry is made.
+
+use std::ffi::c_void;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::device::DeviceState;
+use super::geometry::Kind;
+use super::{Device, EmbreeError, Geometry, sys};
+use crate::prism::PrismHit;
+use crate::ray::{Aabb, Ray};
+
+/// The hit test of a set of primitives, called from many threads at once.
+///
+/// A panic inside reads as a miss, and [`Device::check`] reports it.
+pub trait HitTest: Send + Sync {
+    /// Number of primitives, below 2^32 - 1.
+    fn len(&self) -> usize;
+
+    /// Whether there is none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// A box that holds every hit on `prim`; it is padded against rounding by the caller.
+    fn bounds(&self, prim: u32) -> Aabb;
+
+    /// The first hit with t in (tnear, tfar), along the unnormalised direction.
+    fn intersect(&self, prim: u32, ray: &Ray) -> Option<PrismHit>;
+
+    /// Whether there is any.
+    fn occluded(&self, prim: u32, ray: &Ray) -> bool {
+        self.intersect(prim, ray).is_some()
+    }
+}
+
+/// A user geometry over a [`HitTest`].
+pub struct UserGeometry(Geometry);
+
+impl From<UserGeometry> for Geometry {
+    fn from(user: UserGeometry) -> Self {
+        user.0
+    }
+}
+
+impl UserGeometry {
+    /// A geometry whose primitives are those of `test`, which lives as long as Embree may call it.
+    pub fn new<T: HitTest + 'static>(device: &Device, test: Arc<T>) -> Result<Self, EmbreeError> {
+        let stored = Stored::new(device, test)?;
+        // SAFETY: the callbacks are those of Stored<T>, and the pointer leads to the Stored<T> that is kept.
+        let geometry = unsafe {
+            Geometry::from_raw(device, Kind::User, stored.clone(), || {
+                sys::pm_geometry_new_user(
+                    device.raw(),
+                    &Stored::<T>::CALLBACKS,
+                    Arc::as_ptr(&stored).cast(),
+                    stored.primitives,
+                )
+            })
+        };
+        geometry.map(Self)
+    }
+}
+
+impl Geometry {
+    /// Another test for a user geometry; needs a commit.
+    pub(super) fn replace_test<T: HitTest + 'static>(
+        &mut self,
+        test: Arc<T>,
+    ) -> Result<(), EmbreeError> {
+        debug_assert_eq!(self.kind, Kind::User);
+        let stored = Stored::new(&self.device, test)?;
+        // SAFETY: as in `UserGeometry::new`; the scene is not traced now, so that nothing runs in the old test.
+        let outcome = self.device.guarded(|| unsafe {
+            sys::pm_geometry_set_test(
+                self.raw(),
+                &Stored::<T>::CALLBACKS,
+                Arc::as_ptr(&stored).cast(),
+                stored.primitives,
+            );
+        });
+        // Also on an error: the shim holds the new pointers already.
+        self.keep = stored;
+        outcome
+    }
+}
+
+/// What the geometry's user pointer leads to.
+struct Stored<T> {
+    test: Arc<T>,
+    state: Arc<DeviceState>,
+    primitives: u32,
+}
+
+/// Ulps of the largest coordinate by which boxes grow: Embree's box test rounds a handful of times, and its
+/// robust mode does not reach user geometry.
+const PADDING_ULPS: f32 = 8.0;
+
+/// Embree drops boxes that reach further.
+const LARGEST_COORDINATE: f32 = 1.844e18;
+
+impl<T: HitTest + 'static> Stored<T> {
+    const CALLBACKS: sys::pm_hit_test = sys::pm_hit_test {
+        bounds: Some(Self::on_bounds),
+        intersect: Some(Self::on_intersect),
+        occluded: Some(Self::on_occluded),
+    };
+
+    fn new(device: &Device, test: Arc<T>) -> Result<Arc<Self>, EmbreeError> {
+        let primitives = super::geometry::count("primitives", test.len())?;
+        Ok(Arc::new(Self {
+            test,
+            state: device.state().clone(),
+            primitives,
+        }))
+    }
+
+    /// No panic may cross the C frames below: it is kept for [`Device::check`], and the ray sees a miss.
+    fn caught<R>(&self, miss: R, call: impl FnOnce() -> R) -> R {
+        catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| {
+            self.state.record_panic(&*payload);
+            miss
+        })
+    }
+
+    fn checked_bounds(&self, prim: u32) -> Aabb {
+        let found = self.test.bounds(prim);
+        let bounds = found.padded(PADDING_ULPS);
+        let reach = bounds.min.abs().max(bounds.max.abs());
+        if bounds.is_valid() && reach.cmple(Vec3::splat(LARGEST_COORDINATE)).all() {
+            return bounds;
+        }
+        self.state.record(EmbreeError::InvalidBounds {
+            prim,
+            min: found.min,
+            max: found.max,
+        });
+        Aabb::EMPTY
+    }
+
+    unsafe extern "C" fn on_bounds(user: *const c_void, prim: u32, out: *mut f32) {
+        // SAFETY: `user` is the Stored<T> given with CALLBACKS; `out` has room for six floats.
+        let (stored, out) = unsafe { (&*user.cast::<Self>(), &mut *out.cast::<[f32; 6]>()) };
+        let bounds = stored.caught(Aabb::EMPTY, || stored.checked_bounds(prim));
+        out[..3].copy_from_slice(&bounds.min.to_array());
+        out[3..].copy_from_slice(&bounds.max.to_array());
+    }
+
+    unsafe extern "C" fn on_intersect(
+        user: *const c_void,
+        prim: u32,
+        ray: *const sys::pm_ray,
+        hit: *mut sys::pm_hit,
+    ) -> bool {
+        // SAFETY: `user` is the Stored<T> given with CALLBACKS; `ray` is valid during the call.
+        let (stored, ray) = unsafe { (&*user.cast::<Self>(), &*ray) };
+        let found = stored.caught(None, || stored.test.intersect(prim, &ray_from_raw(ray)));
+        let Some(found) = found else { return false };
+        let raw = sys::pm_hit {
+            t: found.t,
+            u: found.u,
+            v: found.v,
+            ng: found.ng.to_array(),
+        };
+        // SAFETY: the shim's pointer is valid for a write.
+        unsafe { hit.write(raw) };
+        true
+    }
+
+    unsafe extern "C" fn on_occluded(
+        user: *const c_void,
+        prim: u32,
+        ray: *const sys::pm_ray,
+    ) -> bool {
+        // SAFETY: as in `on_intersect`.
+        let (stored, ray) = unsafe { (&*user.cast::<Self>(), &*ray) };
+        stored.caught(false, || stored.test.occluded(prim, &ray_from_raw(ray)))
+    }
+}
+
+pub(super) fn ray_from_raw(ray: &sys::pm_ray) -> Ray {
+    Ray {
+        origin: Vec3::from_array(ray.org),
+        direction: Vec3::from_array(ray.dir),
+        tnear: ray.tnear,
+        tfar: ray.tfar,
+        mask: ray.mask,
+        key: ray.id,
+    }
+}

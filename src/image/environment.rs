@@ -1,0 +1,62 @@
+//! Light from all around: equirectangular HDR pictures.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::color::{ColorPixels, ColorSpace, check_pixels, load_color};
+use super::{Format, ImageError, format};
+
+/// An equirectangular HDR picture: top row first, the top row is +Y, the middle column looks along -Z.
+#[derive(Clone, Debug)]
+pub struct EnvironmentImage {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Linear RGB radiance, finite, non-negative.
+    pub pixels: Vec<Vec3>,
+}
+
+/// Reads an OpenEXR or Radiance HDR picture. A NaN, infinite or negative pixel is an error: one of them would
+/// poison every sum over the sphere.
+pub fn load_environment(path: &Path) -> Result<EnvironmentImage, ImageError> {
+    let (format, _) = format::open(path)?;
+    if !matches!(format, Format::Exr | Format::Hdr) {
+        return Err(ImageError::NotRadiance {
+            path: path.to_owned(),
+            format,
+        });
+    }
+    let image = load_color(path, ColorSpace::Linear)?;
+    let (width, height) = (image.width, image.height);
+    let ColorPixels::Linear(pixels) = image.pixels else {
+        // Only 8-bit sRGB pictures stay encoded.
+        return Err(ImageError::NotRadiance {
+            path: path.to_owned(),
+            format,
+        });
+    };
+    check_pixels(
+        path,
+        width,
+        height,
+        &pixels,
+        |c| c >= 0.0,
+        "radiance must be finite and not negative",
+    )?;
+    let pixels = pixels
+        .chunks_exact(width)
+        .rev()
+        .flatten()
+        .map(|&pixel| pixel.into())
+        .collect();
+    Ok(EnvironmentImage {
+        width,
+        height,
+        pixels,
+    })
+}
+
+#[cfg(test)]
+mod tests;

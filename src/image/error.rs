@@ -1,0 +1,169 @@
+//! Why a picture could not be read.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use super::{Format, MAX_PIXELS};
+use crate::surface::MapError;
+
+/// Why a picture could not be read. Each names the file.
+#[derive(Debug, Error)]
+pub enum ImageError {
+    /// No such file, no permission, a folder.
+    #[error("cannot read {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Zero bytes.
+    #[error("{path} is empty; a PNG, JPEG, TIFF, EXR or Radiance HDR picture is expected")]
+    EmptyFile {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The first bytes are those of no format that is read.
+    #[error("{path} is not a PNG, JPEG, TIFF, EXR or Radiance HDR picture")]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Broken, truncated, or a variant of the format that is not supported.
+    #[error("cannot decode {path} as {format}: {reason}")]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// What its first bytes say it is.
+        format: Format,
+        /// What the decoder met.
+        reason: String,
+    },
+    /// Zero pixels across or up.
+    #[error("{path} is {width}x{height} pixels; at least 1x1 is needed")]
+    NoPixels {
+        /// The file.
+        path: PathBuf,
+        /// Pixels across.
+        width: u64,
+        /// Pixels up.
+        height: u64,
+    },
+    /// More than [`MAX_PIXELS`].
+    #[error("{path} claims {width}x{height} pixels; at most {MAX_PIXELS} pixels are read")]
+    TooManyPixels {
+        /// The file.
+        path: PathBuf,
+        /// Pixels across.
+        width: u64,
+        /// Pixels up.
+        height: u64,
+    },
+    /// Samples of a kind that cannot be kept: signed or 32-bit integers, palettes in TIFF, subsampled channels.
+    #[error("{path} holds {found}, which is not supported; {expected}")]
+    UnsupportedSamples {
+        /// The file.
+        path: PathBuf,
+        /// The kind of samples.
+        found: String,
+        /// What to convert it to.
+        expected: &'static str,
+    },
+    /// The wanted channel is not in the file.
+    #[error("{path} has no channel {wanted}; its channels are {found}")]
+    NoSuchChannel {
+        /// The file.
+        path: PathBuf,
+        /// What was asked for.
+        wanted: String,
+        /// All channels of the file.
+        found: String,
+    },
+    /// A channel's short name fits several channels.
+    #[error("channel {wanted} of {path} could be any of {found}; give the full name")]
+    AmbiguousChannel {
+        /// The file.
+        path: PathBuf,
+        /// What was asked for.
+        wanted: String,
+        /// The channels that fit.
+        found: String,
+    },
+    /// A colour picture was to be read as one channel, but its channels differ.
+    #[error(
+        "the channels {channels} of {path} differ, first at pixel ({x}, {y}) from the bottom left; choose one of them"
+    )]
+    ChannelsDisagree {
+        /// The file.
+        path: PathBuf,
+        /// The channels that were compared.
+        channels: String,
+        /// Column from the left.
+        x: usize,
+        /// Row from the bottom.
+        y: usize,
+    },
+    /// A map that cannot be a displacement map.
+    #[error("{path}: {source}")]
+    Map {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: MapError,
+    },
+    /// A NaN, infinite or, where it matters, negative pixel.
+    #[error("pixel ({x}, {y}) from the top left of {path} is {value}; {expected}")]
+    BadPixel {
+        /// The file.
+        path: PathBuf,
+        /// Column from the left.
+        x: usize,
+        /// Row from the top.
+        y: usize,
+        /// The first bad component.
+        value: f32,
+        /// What is wanted.
+        expected: &'static str,
+    },
+    /// A picture of low dynamic range where radiance is needed.
+    #[error("{path} is a {format} picture; an environment needs OpenEXR or Radiance HDR")]
+    NotRadiance {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        format: Format,
+    },
+}
+
+impl ImageError {
+    /// The decoder of `format` gave up on `path`.
+    pub(super) fn decode(path: &Path, format: Format, reason: impl ToString) -> Self {
+        Self::Decode {
+            path: path.to_owned(),
+            format,
+            reason: reason.to_string(),
+        }
+    }
+}
+
+/// Refuses a header's claim before any memory is taken for it.
+pub(super) fn check_size(path: &Path, width: u64, height: u64) -> Result<(), ImageError> {
+    let path = || path.to_owned();
+    if width == 0 || height == 0 {
+        return Err(ImageError::NoPixels {
+            path: path(),
+            width,
+            height,
+        });
+    }
+    if width.saturating_mul(height) > MAX_PIXELS {
+        return Err(ImageError::TooManyPixels {
+            path: path(),
+            width,
+            height,
+        });
+    }
+    Ok(())
+}

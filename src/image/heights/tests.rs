@@ -1,0 +1,450 @@
+use exr::prelude::{Compression, FlatSamples, f16};
+use image::{
+    ExtendedColorType, GrayImage, ImageBuffer, ImageEncoder, ImageFormat, Luma, Rgb, Rgba,
+};
+use tiff::encoder::colortype;
+
+use super::*;
+use crate::image::test_files::{Folder, each_tenth};
+use crate::image::{ExrChannel, write_exr, write_png_gray16};
+
+fn texels(path: &Path, channel: &str) -> Result<(usize, usize, Texels), ImageError> {
+    let Ok(channel) = channel.parse();
+    read_texels(path, &channel)
+}
+
+fn load(path: &Path) -> Result<DisplacementMap, ImageError> {
+    load_heights(path, &Channel::Luminance, Wrap::Repeat)
+}
+
+/// Numbers that compress badly, so that every part of a file matters.
+fn noise(count: usize) -> impl Iterator<Item = u32> {
+    (0..count as u32).map(|i| (i ^ 0x5bd1).wrapping_mul(0x9e37_79b1).rotate_left(i % 31))
+}
+
+#[test]
+fn a_16_bit_png_keeps_all_its_values() {
+    let folder = Folder::new();
+    let path = folder.path("all.png");
+    let all: Vec<u16> = (0..=u16::MAX).collect();
+    write_png_gray16(&path, 256, 256, &all).unwrap();
+    assert_eq!(
+        texels(&path, "luminance").unwrap(),
+        (256, 256, Texels::U16(all))
+    );
+}
+
+#[test]
+fn the_first_texel_is_the_picture_s_bottom_left() {
+    let folder = Folder::new();
+    let picture = GrayImage::from_raw(2, 3, vec![1, 2, 3, 4, 5, 6]).unwrap();
+    let path = folder.picture(ImageFormat::Png, picture);
+    let expected = Texels::U8(vec![5, 6, 3, 4, 1, 2]);
+    assert_eq!(texels(&path, "luminance").unwrap(), (2, 3, expected));
+    let samples = FlatSamples::F32(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let path = folder.exr(
+        (2, 3),
+        Compression::ZIP16,
+        vec![(None, vec![("Y", samples)])],
+    );
+    let expected = Texels::F32(vec![5.0, 6.0, 3.0, 4.0, 1.0, 2.0]);
+    assert_eq!(texels(&path, "luminance").unwrap(), (2, 3, expected));
+}
+
+#[test]
+fn a_channel_can_be_chosen() {
+    let folder = Folder::new();
+    let picture = ImageBuffer::<Rgba<u16>, _>::from_raw(1, 1, vec![1, 2, 3, 40_000]).unwrap();
+    let path = folder.picture(ImageFormat::Png, picture);
+    for (channel, value) in [("r", 1), ("g", 2), ("b", 3), ("a", 40_000), ("R", 1)] {
+        assert_eq!(texels(&path, channel).unwrap().2, Texels::U16(vec![value]));
+    }
+}
+
+#[test]
+fn colours_that_agree_are_read_and_others_are_refused_with_advice() {
+    let folder = Folder::new();
+    let mut picture = ImageBuffer::<Rgb<u8>, _>::from_pixel(3, 2, Rgb([7, 7, 7]));
+    let path = folder.picture(ImageFormat::Png, picture.clone());
+    assert_eq!(
+        texels(&path, "luminance").unwrap().2,
+        Texels::U8(vec![7; 6])
+    );
+    picture.put_pixel(2, 0, Rgb([7, 8, 7]));
+    let path = folder.picture(ImageFormat::Png, picture);
+    let error = texels(&path, "luminance").unwrap_err().to_string();
+    assert!(
+        error.contains("R, G, B") && error.contains("(2, 1)"),
+        "{error}"
+    );
+    assert!(error.contains("choose"), "{error}");
+}
+
+#[test]
+fn grey_with_alpha_reads_its_grey() {
+    let folder = Folder::new();
+    let picture = ImageBuffer::<image::LumaA<u8>, _>::from_raw(2, 1, vec![9, 255, 8, 0]).unwrap();
+    let path = folder.picture(ImageFormat::Png, picture);
+    assert_eq!(
+        texels(&path, "luminance").unwrap().2,
+        Texels::U8(vec![9, 8])
+    );
+    assert_eq!(texels(&path, "a").unwrap().2, Texels::U8(vec![255, 0]));
+}
+
+/// A PNG chunk: length, name, data, checksum.
+fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let body = [&name[..], data].concat();
+    let crc = body.iter().fold(!0u32, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+            if crc & 1 == 1 {
+                crc >> 1 ^ 0xedb8_8320
+            } else {
+                crc >> 1
+            }
+        })
+    });
+    [
+        &(data.len() as u32).to_be_bytes()[..],
+        &body,
+        &(!crc).to_be_bytes(),
+    ]
+    .concat()
+}
+
+/// A PNG whose rows, each led by its filter byte 0, are stored without compression.
+fn png(width: u32, height: u32, depth: u8, color: u8, palette: &[u8], rows: &[u8]) -> Vec<u8> {
+    let header = [
+        &width.to_be_bytes()[..],
+        &height.to_be_bytes(),
+        &[depth, color, 0, 0, 0],
+    ]
+    .concat();
+    let adler = rows.iter().fold((1u32, 0u32), |(a, b), &byte| {
+        let a = (a + u32::from(byte)) % 65521;
+        (a, (b + a) % 65521)
+    });
+    let length = rows.len() as u16;
+    let data = [
+        &[0x78, 0x01, 1][..],
+        &length.to_le_bytes(),
+        &(!length).to_le_bytes(),
+        rows,
+        &(adler.1 << 16 | adler.0).to_be_bytes(),
+    ]
+    .concat();
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    file.extend(chunk(b"IHDR", &header));
+    if !palette.is_empty() {
+        file.extend(chunk(b"PLTE", palette));
+    }
+    file.extend(chunk(b"IDAT", &data));
+    file.extend(chunk(b"IEND", &[]));
+    file
+}
+
+#[test]
+fn palettes_and_greys_below_a_byte_are_widened() {
+    let folder = Folder::new();
+    let path = folder.path("small.png");
+    std::fs::write(&path, png(3, 1, 2, 0, &[], &[0, 0b00_01_11_00])).unwrap();
+    assert_eq!(
+        texels(&path, "luminance").unwrap(),
+        (3, 1, Texels::U8(vec![0, 85, 255]))
+    );
+    let palette = [10, 10, 10, 200, 200, 200];
+    std::fs::write(&path, png(3, 1, 1, 3, &palette, &[0, 0b010_00000])).unwrap();
+    assert_eq!(
+        texels(&path, "luminance").unwrap(),
+        (3, 1, Texels::U8(vec![10, 200, 10]))
+    );
+}
+
+#[test]
+fn a_jpeg_is_read_as_8_bit() {
+    let folder = Folder::new();
+    let path = folder.picture(ImageFormat::Jpeg, GrayImage::from_pixel(16, 8, Luma([100])));
+    let (width, height, Texels::U8(heights)) = texels(&path, "luminance").unwrap() else {
+        panic!("not 8-bit")
+    };
+    assert_eq!((width, height), (16, 8));
+    assert!(heights.iter().all(|&h| h.abs_diff(100) <= 1), "{heights:?}");
+}
+
+#[test]
+fn tiff_keeps_8_16_and_32_bit_samples() {
+    let folder = Folder::new();
+    let path = folder.tiff::<colortype::Gray8>(2, 2, &[1, 2, 3, 4]);
+    assert_eq!(
+        texels(&path, "luminance").unwrap().2,
+        Texels::U8(vec![3, 4, 1, 2])
+    );
+    let path = folder.tiff::<colortype::Gray16>(1, 2, &[1, 65_535]);
+    assert_eq!(
+        texels(&path, "luminance").unwrap().2,
+        Texels::U16(vec![65_535, 1])
+    );
+    let path = folder.tiff::<colortype::Gray32Float>(1, 2, &[-0.1, 1e-7]);
+    assert_eq!(
+        texels(&path, "luminance").unwrap().2,
+        Texels::F32(vec![1e-7, -0.1])
+    );
+    let path = folder.tiff::<colortype::RGB16>(1, 1, &[5, 600, 70]);
+    assert_eq!(texels(&path, "g").unwrap().2, Texels::U16(vec![600]));
+    assert!(matches!(
+        texels(&path, "luminance"),
+        Err(ImageError::ChannelsDisagree { .. })
+    ));
+}
+
+#[test]
+fn tiff_samples_that_would_lose_precision_are_refused() {
+    let folder = Folder::new();
+    let path = folder.tiff::<colortype::Gray32>(1, 1, &[70_000]);
+    assert!(matches!(
+        texels(&path, "luminance"),
+        Err(ImageError::UnsupportedSamples { .. })
+    ));
+    let path = folder.tiff::<colortype::GrayI16>(1, 1, &[-5]);
+    assert!(matches!(
+        texels(&path, "luminance"),
+        Err(ImageError::UnsupportedSamples { .. })
+    ));
+}
+
+const LOSSLESS: [Compression; 5] = [
+    Compression::Uncompressed,
+    Compression::RLE,
+    Compression::ZIP1,
+    Compression::ZIP16,
+    Compression::PIZ,
+];
+
+const LOSSY: [Compression; 3] = [Compression::PXR24, Compression::B44, Compression::B44A];
+
+#[test]
+fn exr_halves_and_floats_are_exact_in_every_lossless_compression() {
+    let folder = Folder::new();
+    let halves: Vec<f16> = (0..=u16::MAX)
+        .map(f16::from_bits)
+        .map(|h| if h.is_finite() { h } else { f16::ZERO })
+        .collect();
+    let floats: Vec<f32> = noise(65_536)
+        .map(|bits| f32::from_bits(bits & 0xbfff_ffff))
+        .collect();
+    let bottom_first = |row_major: &[f32]| -> Vec<f32> {
+        row_major.chunks(512).rev().flatten().copied().collect()
+    };
+    let widened: Vec<f32> = halves.iter().map(|h| h.to_f32()).collect();
+    for compression in LOSSLESS {
+        let path = folder.exr(
+            (512, 128),
+            compression,
+            vec![(
+                None,
+                vec![
+                    ("half", FlatSamples::F16(halves.clone())),
+                    ("full", FlatSamples::F32(floats.clone())),
+                ],
+            )],
+        );
+        let half = texels(&path, "half").unwrap().2;
+        assert_eq!(half, Texels::F32(bottom_first(&widened)), "{compression}");
+        let full = texels(&path, "full").unwrap().2;
+        assert_eq!(full, Texels::F32(bottom_first(&floats)), "{compression}");
+    }
+}
+
+#[test]
+fn exr_channels_of_layers_are_found_by_their_full_name() {
+    let folder = Folder::new();
+    let plane = |value| FlatSamples::F32(vec![value; 4]);
+    let path = folder.exr(
+        (2, 2),
+        Compression::ZIP16,
+        vec![
+            (
+                Some("base"),
+                vec![("Z", plane(1.0)), ("height", plane(2.0))],
+            ),
+            (Some("detail"), vec![("Z", plane(3.0))]),
+        ],
+    );
+    let first = |channel| match texels(&path, channel) {
+        Ok((_, _, Texels::F32(t))) => Ok(t[0]),
+        Ok(_) => panic!("EXR is float"),
+        Err(error) => Err(error.to_string()),
+    };
+    assert_eq!(first("detail.Z"), Ok(3.0));
+    assert_eq!(first("height"), Ok(2.0));
+    assert!(first("Z").unwrap_err().contains("base.Z, detail.Z"));
+    assert!(
+        first("luminance")
+            .unwrap_err()
+            .contains("base.Z, base.height, detail.Z")
+    );
+}
+
+#[test]
+fn exr_integers_are_refused() {
+    let folder = Folder::new();
+    let plane = FlatSamples::U32(vec![1; 4]);
+    let path = folder.exr((2, 2), Compression::ZIP16, vec![(None, vec![("Y", plane)])]);
+    assert!(matches!(
+        texels(&path, "luminance"),
+        Err(ImageError::UnsupportedSamples { .. })
+    ));
+}
+
+#[test]
+fn a_height_that_is_not_finite_is_refused_with_its_place() {
+    let folder = Folder::new();
+    let path = folder.path("bad.exr");
+    let samples = vec![0.0, 0.0, 0.0, f32::NAN, 0.0, 0.0];
+    let channel = ExrChannel {
+        name: "Y".to_owned(),
+        samples,
+    };
+    write_exr(&path, 2, 3, vec![channel], &[]).unwrap();
+    let error = load(&path).unwrap_err();
+    assert!(matches!(error, ImageError::Map { .. }));
+    let error = error.to_string();
+    assert!(
+        error.contains("(1, 1)") && error.contains("bad.exr"),
+        "{error}"
+    );
+}
+
+#[test]
+fn truncated_files_are_refused() {
+    let folder = Folder::new();
+    let size = 48;
+    let pixels = (size * size) as usize;
+    let gray: Vec<u8> = noise(pixels).map(|n| n as u8).collect();
+    let floats: Vec<f32> = noise(pixels).map(|n| n as f32).collect();
+    let picture = GrayImage::from_raw(size, size, gray.clone()).unwrap();
+    each_tenth(&folder.picture(ImageFormat::Png, picture.clone()), load);
+    each_tenth(&folder.picture(ImageFormat::Jpeg, picture), load);
+    each_tenth(&folder.tiff::<colortype::Gray8>(size, size, &gray), load);
+    each_tenth(
+        &folder.tiff::<colortype::Gray32Float>(size, size, &floats),
+        load,
+    );
+    for compression in LOSSLESS.into_iter().chain(LOSSY) {
+        let channels = vec![("Y", FlatSamples::F32(floats.clone()))];
+        each_tenth(
+            &folder.exr((48, 48), compression, vec![(None, channels)]),
+            load,
+        );
+    }
+}
+
+#[test]
+fn damaged_files_are_read_or_refused() {
+    let folder = Folder::new();
+    let size = 12;
+    let floats: Vec<f32> = noise(size * size).map(|n| n as f32).collect();
+    let gray: Vec<u8> = noise(size * size).map(|n| n as u8).collect();
+    let picture = GrayImage::from_raw(size as u32, size as u32, gray).unwrap();
+    let mut paths = Vec::new();
+    for format in [ImageFormat::Png, ImageFormat::Jpeg] {
+        let path = folder.path(format.to_mime_type().rsplit('/').next().unwrap());
+        std::fs::rename(folder.picture(format, picture.clone()), &path).unwrap();
+        paths.push(path);
+    }
+    paths.push(folder.tiff::<colortype::Gray32Float>(size as u32, size as u32, &floats));
+    for compression in LOSSLESS.into_iter().chain(LOSSY) {
+        let channels = vec![("Y", FlatSamples::F32(floats.clone()))];
+        let path = folder.path(&format!("{compression}.exr").replace(' ', ""));
+        let written = folder.exr((size, size), compression, vec![(None, channels)]);
+        std::fs::rename(written, &path).unwrap();
+        paths.push(path);
+    }
+    for path in paths {
+        let whole = std::fs::read(&path).unwrap();
+        for at in 0..whole.len() {
+            for damage in [0xff, 0x80, 0x01] {
+                let mut bytes = whole.clone();
+                bytes[at] ^= damage;
+                std::fs::write(&path, bytes).unwrap();
+                let _: Result<_, ImageError> = load(&path);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_header_that_claims_too_much_is_refused_at_once() {
+    let folder = Folder::new();
+    let path = folder.path("huge");
+    let refused = |path: &Path| {
+        let result = load(path);
+        assert!(
+            matches!(result, Err(ImageError::TooManyPixels { .. })),
+            "{result:?}"
+        );
+    };
+    std::fs::write(&path, png(100_000, 100_000, 16, 0, &[], &[0])).unwrap();
+    refused(&path);
+
+    let tiff = folder.tiff::<colortype::Gray8>(2, 2, &[1, 2, 3, 4]);
+    let mut bytes = std::fs::read(&tiff).unwrap();
+    // Tags 256 and 257, ImageWidth and ImageLength, whatever their type.
+    let directory = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
+    for entry in 0..2 {
+        let at = directory + 2 + 12 * entry;
+        assert_eq!(
+            u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap()),
+            256 + entry as u16
+        );
+        bytes[at + 2..at + 4].copy_from_slice(&4u16.to_le_bytes());
+        bytes[at + 8..at + 12].copy_from_slice(&100_000u32.to_le_bytes());
+    }
+    std::fs::write(&path, bytes).unwrap();
+    refused(&path);
+
+    let channels = vec![("Y", FlatSamples::F32(vec![0.0; 4]))];
+    let exr = folder.exr((2, 2), Compression::ZIP16, vec![(None, channels)]);
+    let mut bytes = std::fs::read(&exr).unwrap();
+    for window in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+        let at = bytes
+            .windows(window.len())
+            .position(|w| w == window)
+            .unwrap()
+            + window.len()
+            + 4;
+        bytes[at + 8..at + 12].copy_from_slice(&99_999i32.to_le_bytes());
+        bytes[at + 12..at + 16].copy_from_slice(&99_999i32.to_le_bytes());
+    }
+    std::fs::write(&path, bytes).unwrap();
+    refused(&path);
+}
+
+#[test]
+fn files_that_are_no_pictures_are_named() {
+    let folder = Folder::new();
+    let path = folder.path("nothing.png");
+    assert!(matches!(load(&path), Err(ImageError::Read { .. })));
+    std::fs::write(&path, b"").unwrap();
+    assert!(matches!(load(&path), Err(ImageError::EmptyFile { .. })));
+    std::fs::write(&path, b"Not a picture at all.").unwrap();
+    assert!(matches!(load(&path), Err(ImageError::UnknownFormat { .. })));
+    std::fs::write(&path, png(0, 0, 8, 0, &[], &[])).unwrap();
+    assert!(load(&path).unwrap_err().to_string().contains("nothing.png"));
+    assert!(load(path.parent().unwrap()).is_err());
+}
+
+#[test]
+fn the_name_of_the_file_does_not_decide_its_format() {
+    let folder = Folder::new();
+    let path = folder.path("really_a_png.jpg");
+    let mut bytes = Vec::new();
+    image::codecs::png::PngEncoder::new(&mut bytes)
+        .write_image(&[3, 4], 2, 1, ExtendedColorType::L8)
+        .unwrap();
+    std::fs::write(&path, bytes).unwrap();
+    assert_eq!(
+        texels(&path, "luminance").unwrap().2,
+        Texels::U8(vec![3, 4])
+    );
+}

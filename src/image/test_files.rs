@@ -1,0 +1,97 @@
+//! Files for the tests of this room.
+
+use std::path::{Path, PathBuf};
+
+use image::{DynamicImage, ImageFormat};
+use tempfile::TempDir;
+
+/// A folder that lives as long as the test.
+pub struct Folder(TempDir);
+
+impl Folder {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn picture(&self, format: ImageFormat, picture: impl Into<DynamicImage>) -> PathBuf {
+        let path = self.path("picture");
+        picture.into().save_with_format(&path, format).unwrap();
+        path
+    }
+
+    pub fn tiff<C: tiff::encoder::colortype::ColorType>(
+        &self,
+        width: u32,
+        height: u32,
+        samples: &[C::Inner],
+    ) -> PathBuf
+    where
+        [C::Inner]: tiff::encoder::TiffValue,
+    {
+        let path = self.path("picture.tif");
+        let file = std::fs::File::create(&path).unwrap();
+        tiff::encoder::TiffEncoder::new(file)
+            .unwrap()
+            .write_image::<C>(width, height, samples)
+            .unwrap();
+        path
+    }
+
+    /// Layers of (name, channels of (name, samples, top row first)).
+    pub fn exr(
+        &self,
+        size: (usize, usize),
+        compression: exr::prelude::Compression,
+        layers: Vec<(Option<&str>, Vec<(&str, exr::prelude::FlatSamples)>)>,
+    ) -> PathBuf {
+        use exr::prelude::*;
+        let path = self.path("picture.exr");
+        let layers = layers.into_iter().map(|(name, channels)| {
+            let attributes = LayerAttributes {
+                layer_name: name.map(Text::from),
+                ..Default::default()
+            };
+            let encoding = Encoding {
+                compression,
+                ..Encoding::UNCOMPRESSED
+            };
+            let channels = channels
+                .into_iter()
+                .map(|(name, samples)| AnyChannel::new(name, samples));
+            Layer::new(
+                size,
+                attributes,
+                encoding,
+                AnyChannels::sort(channels.collect()),
+            )
+        });
+        let window = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+        let layers: Layers<_> = layers.collect();
+        Image::from_layers(window, layers)
+            .write()
+            .to_file(&path)
+            .unwrap();
+        path
+    }
+}
+
+/// Calls `load` for the file cut at every tenth of its length: every cut must be refused.
+pub fn each_tenth<T>(path: &Path, load: impl Fn(&Path) -> Result<T, super::ImageError>) {
+    let whole = std::fs::read(path).unwrap();
+    assert!(load(path).is_ok(), "the whole {path:?}");
+    for tenth in 0..10 {
+        std::fs::write(path, &whole[..whole.len() * tenth / 10]).unwrap();
+        let error = load(path)
+            .err()
+            .unwrap_or_else(|| panic!("{tenth}/10 of {path:?} was read"));
+        assert!(
+            error.to_string().contains(path.to_str().unwrap()),
+            "{error}"
+        );
+    }
+    std::fs::write(path, whole).unwrap();
+}

@@ -1,0 +1,149 @@
+//! Eight lanes in one AVX register.
+//!
+//! # Safety
+//!
+//! The intrinsics below need AVX2 and FMA. A value of [`Avx2`] is made only inside kernels stamped with
+//! `target_feature(enable = "avx2,fma")`, which are called only after [`SimdLevel::Avx2`](super::SimdLevel)
+//! was found supported; so wherever one exists, the instructions do too. Every function here is
+//! `inline(always)`, to become part of such a kernel.
+
+use std::arch::x86_64::*;
+use std::ops::{Add, Div, Mul, Sub};
+
+use super::{Grid, LANES, Lanes};
+use crate::surface::Texels;
+
+#[derive(Clone, Copy)]
+pub struct Avx2(__m256);
+
+macro_rules! lanewise {
+    ($operator:ident, $method:ident, $intrinsic:ident) => {
+        impl $operator for Avx2 {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                // SAFETY: AVX is there wherever an `Avx2` is (module documentation).
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        }
+    };
+}
+
+lanewise!(Add, add, _mm256_add_ps);
+lanewise!(Sub, sub, _mm256_sub_ps);
+lanewise!(Mul, mul, _mm256_mul_ps);
+lanewise!(Div, div, _mm256_div_ps);
+
+impl Lanes for Avx2 {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        // SAFETY: called in AVX2 kernels only (module documentation).
+        Self(unsafe { _mm256_set1_ps(x) })
+    }
+
+    #[inline(always)]
+    fn from_array(x: [f32; LANES]) -> Self {
+        // SAFETY: called in AVX2 kernels only; an unaligned load of 8 floats from an array of 8.
+        Self(unsafe { _mm256_loadu_ps(x.as_ptr()) })
+    }
+
+    #[inline(always)]
+    fn to_array(self) -> [f32; LANES] {
+        let mut out = [0.0; LANES];
+        // SAFETY: AVX is there; an unaligned store of 8 floats into an array of 8.
+        unsafe { _mm256_storeu_ps(out.as_mut_ptr(), self.0) };
+        out
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        // SAFETY: FMA is there wherever an `Avx2` is.
+        Self(unsafe { _mm256_fmadd_ps(self.0, a.0, b.0) })
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: AVX is there wherever an `Avx2` is.
+        Self(unsafe { _mm256_min_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: AVX is there wherever an `Avx2` is.
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn floor(self) -> Self {
+        // SAFETY: AVX is there wherever an `Avx2` is.
+        Self(unsafe { _mm256_floor_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: AVX is there wherever an `Avx2` is.
+        Self(unsafe { _mm256_sqrt_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn sign_mask(self) -> u32 {
+        // SAFETY: AVX is there wherever an `Avx2` is.
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+
+    #[inline(always)]
+    fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4] {
+        // Moved inside here, so that the gathers below are in bounds whatever the caller passes; `max` gives 0
+        // for NaN.
+        let i = i.max(Self::splat(0.0)).min(Self::splat(grid.size[0] - 1.0));
+        let j = j.max(Self::splat(0.0)).min(Self::splat(grid.size[1] - 1.0));
+        // SAFETY: AVX2 is there. 0 <= i <= width - 1 and 0 <= j <= height - 1, so index + stride + 1 is at most
+        // (height + 1) * (width + 1) - 1, the last stored texel; it fits i32 because sides are at most
+        // `DisplacementMap::MAX_SIDE`. The 32-bit loads of narrower texels start at such a texel and end inside
+        // the four texels that `DisplacementMap` stores after the last one.
+        unsafe {
+            let stride = _mm256_set1_epi32(grid.stride as i32);
+            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
+            let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
+            let above = _mm256_add_epi32(index, stride);
+            match grid.texels {
+                Texels::U8(t) => {
+                    let load = |index| _mm256_i32gather_epi32::<1>(t.as_ptr().cast(), index);
+                    let ([a, b], [c, d]) = (pair::<8>(load(index)), pair::<8>(load(above)));
+                    [a, b, c, d]
+                }
+                Texels::U16(t) => {
+                    let load = |index| _mm256_i32gather_epi32::<2>(t.as_ptr().cast(), index);
+                    let ([a, b], [c, d]) = (pair::<16>(load(index)), pair::<16>(load(above)));
+                    [a, b, c, d]
+                }
+                Texels::F32(t) => {
+                    let load = |index, offset| {
+                        Self(_mm256_i32gather_ps::<4>(t.as_ptr().add(offset), index))
+                    };
+                    [
+                        load(index, 0),
+                        load(index, 1),
+                        load(above, 0),
+                        load(above, 1),
+                    ]
+                }
+            }
+        }
+    }
+}
+
+/// The two lowest unsigned `BITS`-bit numbers of every lane.
+///
+/// # Safety
+///
+/// Needs AVX2.
+#[inline(always)]
+unsafe fn pair<const BITS: i32>(words: __m256i) -> [Avx2; 2] {
+    // SAFETY: the caller has AVX2.
+    unsafe {
+        let mask = _mm256_set1_epi32((1 << BITS) - 1);
+        let second = _mm256_and_si256(_mm256_srli_epi32::<BITS>(words), mask);
+        [_mm256_and_si256(words, mask), second].map(|x| Avx2(_mm256_cvtepi32_ps(x)))
+    }
+}

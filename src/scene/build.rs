@@ -1,0 +1,431 @@
+//! From a scene file to a [`Scene`]: loads what it names, each file once, and fills in what it leaves out.
+
+mod assets;
+mod frame;
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::f32::consts::PI;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{Affine3A, Vec3};
+
+use super::error::{AssetError, SceneError};
+use super::file::{
+    BaseColorTable, DisplacementTable, Keyed, LightTable, MaterialTable, MeshTable, SceneFile,
+    SCALE, default_sun,
+};
+use super::load::{FileDisplacement, FileMaterial, FileTexture, load_mesh};
+use super::{Camera, Color, Film, Light, Material, ObjectShape, Scene, SceneObject, Texture};
+use crate::image::{Channel, ColorSpace};
+use crate::prism::March;
+use crate::surface::{
+    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, UvTransform,
+    Wrap,
+};
+use assets::Assets;
+
+/// A displacement map and the file it is from, for reports.
+#[derive(Clone, Debug)]
+pub struct MapFile {
+    /// The picture.
+    pub path: PathBuf,
+    /// The heights, shared by all that use them.
+    pub map: Arc<DisplacementMap>,
+}
+
+/// A scene, and what there is to say of its files.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The scene.
+    pub scene: Scene,
+    /// Its displacement maps, each file once.
+    pub maps: Vec<MapFile>,
+    /// What was mended on the way, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// One mesh under one map, as named on a command line.
+#[derive(Clone, Debug)]
+pub struct MeshAndMap {
+    /// The mesh file; all its parts are taken.
+    pub mesh: PathBuf,
+    /// The displacement map.
+    pub map: PathBuf,
+    /// Which channel of it.
+    pub channel: Channel,
+    /// Outside [0, 1].
+    pub wrap: Wrap,
+    /// What heights mean.
+    pub displacement: Displacement,
+    /// How it is marched.
+    pub march: March,
+}
+
+impl Loaded {
+    /// Loads the scene file at `path` and every file it names.
+    pub fn from_file(path: &Path) -> Result<Self, SceneError> {
+        let file = SceneFile::read(path)?;
+        let mut builder = Builder::default();
+        for material in &file.materials {
+            let material = builder.material(material)?;
+            builder.materials.push(material);
+        }
+        for mesh in &file.meshes {
+            builder.mesh(mesh)?;
+        }
+        let lights = match &file.lights[..] {
+            [] => builder.lights(&LightTable::daylight())?,
+            lights => builder.lights(lights)?,
+        };
+        let camera = frame::camera(&file.camera, frame::bounds(&builder.objects))?;
+        Ok(builder.finish(path, camera, file.film, lights))
+    }
+
+    /// The scene of one displaced mesh, seen by the default camera. The parts of the file become one object.
+    pub fn from_mesh_and_map(source: &MeshAndMap) -> Result<Self, AssetError> {
+        let mut builder = Builder::default();
+        let MeshAndMap { mesh, map, .. } = source;
+        let map = builder.assets.heights(map, &source.channel, source.wrap)?;
+        let mut file = load_mesh(mesh)?;
+        builder.warn_all(mesh, std::mem::take(&mut file.warnings));
+        let name = stem(mesh);
+        let whole = file.into_single_mesh();
+        let whole = builder.base_mesh(mesh, &name, whole, &Shaping::default())?;
+        let surface = displaced(&name, whole, &map, source.displacement)?;
+        let material = builder.default_material();
+        builder.objects.push(SceneObject {
+            name,
+            shape: ObjectShape::Displaced(surface, source.march),
+            instances: Vec::new(),
+            mask: u32::MAX,
+            material,
+        });
+        let camera = frame::default_camera(frame::bounds(&builder.objects));
+        Ok(builder.finish(mesh, camera, Film::default(), Vec::new()))
+    }
+}
+
+/// How a mesh file's parts are brought into shape.
+struct Shaping {
+    transform: Affine3A,
+    recompute_normals: bool,
+    /// Radians.
+    crease_angle: f32,
+}
+
+impl Default for Shaping {
+    fn default() -> Self {
+        Self {
+            transform: Affine3A::IDENTITY,
+            recompute_normals: false,
+            crease_angle: PI,
+        }
+    }
+}
+
+/// Collects a scene.
+#[derive(Default)]
+struct Builder {
+    assets: Assets,
+    objects: Vec<SceneObject>,
+    materials: Vec<Material>,
+    default_material: Option<usize>,
+    warnings: Vec<String>,
+}
+
+impl Builder {
+    fn mesh(&mut self, table: &MeshTable) -> Result<(), SceneError> {
+        let path = &table.file.value;
+        let asset = |source: AssetError| table.file.asset(source);
+        let named = self.material_index(table.material.as_ref())?;
+        let name = table.name.clone().unwrap_or_else(|| stem(path));
+        let shaping = Shaping {
+            transform: table.transform,
+            recompute_normals: table.recompute_normals,
+            crease_angle: table.crease_angle,
+        };
+        let loaded = load_mesh(path).map_err(|e| asset(e.into()))?;
+        self.warn_all(path, loaded.warnings);
+        let single = loaded.parts.len() == 1;
+        let mut of_file = HashMap::new();
+        for part in loaded.parts {
+            let name = if single {
+                name.clone()
+            } else {
+                format!("{name}.{}", part.name)
+            };
+            let mesh = self
+                .base_mesh(path, &name, part.mesh, &shaping)
+                .map_err(asset)?;
+            let shape = match &table.displacement {
+                Some(displacement) => {
+                    let by_file = part.material.as_ref().and_then(|m| m.displacement.as_ref());
+                    self.displaced(&table.file, displacement, by_file, &name, mesh)?
+                }
+                None => ObjectShape::Plain(mesh),
+            };
+            let material = match (named, part.material) {
+                (Some(index), _) => index,
+                (None, Some(material)) => match of_file.entry(material.name.clone()) {
+                    Entry::Occupied(known) => *known.get(),
+                    Entry::Vacant(new) => {
+                        *new.insert(self.file_material(path, material).map_err(asset)?)
+                    }
+                },
+                (None, None) => self.default_material(),
+            };
+            self.objects.push(SceneObject {
+                name,
+                shape,
+                instances: table.instances.clone(),
+                mask: table.mask,
+                material,
+            });
+        }
+        Ok(())
+    }
+
+    /// Transforms and validates a mesh; what was mended becomes a warning.
+    fn base_mesh(
+        &mut self,
+        path: &Path,
+        name: &str,
+        mesh: MeshBuilder,
+        shaping: &Shaping,
+    ) -> Result<Arc<BaseMesh>, AssetError> {
+        let keep = !shaping.recompute_normals && !mesh.normals.is_empty();
+        let normals = if keep {
+            NormalMode::File
+        } else {
+            NormalMode::Smooth {
+                crease_angle: shaping.crease_angle,
+            }
+        };
+        let (mesh, report) = mesh
+            .transformed(&shaping.transform)
+            .build(normals)
+            .map_err(|source| AssetError::Geometry {
+                path: path.to_owned(),
+                part: name.to_owned(),
+                source,
+            })?;
+        if report.degenerate_dropped > 0 {
+            let dropped = report.degenerate_dropped;
+            self.warn(path, format!("{name}: {dropped} faces without area were left out"));
+        }
+        Ok(Arc::new(mesh))
+    }
+
+    /// What the scene does not say of a displacement is taken from the mesh file, if that names the map.
+    fn displaced(
+        &mut self,
+        file: &Keyed<PathBuf>,
+        table: &DisplacementTable,
+        by_file: Option<&FileDisplacement>,
+        name: &str,
+        mesh: Arc<BaseMesh>,
+    ) -> Result<ObjectShape, SceneError> {
+        let by_file = by_file.filter(|_| table.map.is_none());
+        let (path, at) = match (&table.map, by_file) {
+            (Some(map), _) => (&map.value, map),
+            (None, Some(map)) => (&map.path, file),
+            (None, None) => {
+                let found = format!("no map, and the file of {name} names none");
+                return Err(table.this.refuse(found, "map = \"FILE\""));
+            }
+        };
+        let Some(scale) = table.scale.or(by_file.and_then(|f| f.scale)) else {
+            return Err(table.this.refuse("no scale", SCALE));
+        };
+        let channel = match (&table.channel, by_file.and_then(|f| f.channel)) {
+            (Some(channel), _) => channel.clone(),
+            (None, Some(letter)) => {
+                let Ok(channel) = letter.parse();
+                channel
+            }
+            (None, None) => Channel::default(),
+        };
+        let wrap = table.wrap.or(by_file.and_then(|f| f.wrap));
+        let displacement = Displacement {
+            scale,
+            midlevel: table
+                .midlevel
+                .or(by_file.and_then(|f| f.midlevel))
+                .unwrap_or(0.0),
+            uv: table.uv.or(by_file.map(|f| f.uv)).unwrap_or_default(),
+        };
+        let map = self
+            .assets
+            .heights(path, &channel, wrap.unwrap_or_default())
+            .map_err(|e| at.asset(e))?;
+        let surface = displaced(name, mesh, &map, displacement).map_err(|e| file.asset(e))?;
+        Ok(ObjectShape::Displaced(surface, table.march))
+    }
+
+    /// The index of the material that the scene names.
+    fn material_index(&self, name: Option<&Keyed<String>>) -> Result<Option<usize>, SceneError> {
+        let Some(name) = name else { return Ok(None) };
+        let index = self.materials.iter().position(|m| m.name == name.value);
+        index.map(Some).ok_or_else(|| {
+            let known: Vec<_> = self.materials.iter().map(|m| &m.name[..]).collect();
+            let expected = match known[..] {
+                [] => "the name of a [[material]]; the scene has none".into(),
+                _ => format!("the name of a [[material]]: {}", known.join(", ")),
+            };
+            name.refuse(format!("{:?}", name.value), expected)
+        })
+    }
+
+    /// Adds a material that a mesh file gives.
+    fn file_material(&mut self, path: &Path, file: FileMaterial) -> Result<usize, AssetError> {
+        let image = match &file.base_color_texture {
+            Some(FileTexture::Path(picture)) => {
+                Some(self.assets.color(picture, ColorSpace::Srgb, file.base_color)?)
+            }
+            Some(FileTexture::Embedded(bytes)) => {
+                Some(assets::embedded_color(path, bytes, file.base_color)?)
+            }
+            None => None,
+        };
+        let base_color = match image {
+            Some(image) => Color::Texture(Texture {
+                image,
+                wrap: Wrap::Repeat,
+                uv: UvTransform::default(),
+            }),
+            None => Color::Constant(file.base_color),
+        };
+        self.materials.push(Material {
+            name: file.name,
+            base_color,
+            metallic: file.metallic.unwrap_or(0.0),
+            roughness: file.roughness.unwrap_or(1.0),
+            specular: 0.5,
+        });
+        Ok(self.materials.len() - 1)
+    }
+
+    /// Grey, for meshes that nothing else is said of.
+    fn default_material(&mut self) -> usize {
+        *self.default_material.get_or_insert_with(|| {
+            self.materials.push(Material {
+                name: "default".into(),
+                base_color: Color::Constant(Vec3::splat(0.5)),
+                metallic: 0.0,
+                roughness: 1.0,
+                specular: 0.5,
+            });
+            self.materials.len() - 1
+        })
+    }
+
+    fn material(&mut self, table: &MaterialTable) -> Result<Material, SceneError> {
+        let base_color = match &table.base_color {
+            BaseColorTable::Constant(c) => Color::Constant(*c),
+            BaseColorTable::Texture(t) => Color::Texture(Texture {
+                image: self
+                    .assets
+                    .color(&t.file.value, t.color_space, Vec3::ONE)
+                    .map_err(|e| t.file.asset(e))?,
+                wrap: t.wrap,
+                uv: t.uv,
+            }),
+        };
+        Ok(Material {
+            name: table.name.value.clone(),
+            base_color,
+            metallic: table.metallic,
+            roughness: table.roughness,
+            specular: table.specular,
+        })
+    }
+
+    fn lights(&mut self, tables: &[LightTable]) -> Result<Vec<Light>, SceneError> {
+        let sun = tables.iter().find_map(|light| match light {
+            LightTable::Sun { direction, .. } => Some(*direction),
+            _ => None,
+        });
+        let light = |table: &LightTable| {
+            Ok(match *table {
+                LightTable::Sun {
+                    direction,
+                    strength,
+                } => Light::Sun {
+                    direction,
+                    strength,
+                },
+                LightTable::Sky {
+                    turbidity,
+                    strength,
+                } => Light::Sky {
+                    sun_direction: sun.unwrap_or_else(default_sun),
+                    turbidity,
+                    strength,
+                },
+                LightTable::Environment {
+                    ref file,
+                    rotation,
+                    strength,
+                } => Light::Environment {
+                    image: self
+                        .assets
+                        .environment(&file.value)
+                        .map_err(|e| file.asset(e))?,
+                    rotation,
+                    strength,
+                },
+            })
+        };
+        tables.iter().map(light).collect()
+    }
+
+    fn warn(&mut self, path: &Path, what: impl Display) {
+        self.warnings.push(format!("{}: {what}", path.display()));
+    }
+
+    fn warn_all(&mut self, path: &Path, what: Vec<String>) {
+        for line in what {
+            self.warn(path, line);
+        }
+    }
+
+    fn finish(self, path: &Path, camera: Camera, film: Film, lights: Vec<Light>) -> Loaded {
+        Loaded {
+            maps: self.assets.into_maps(),
+            warnings: self.warnings,
+            scene: Scene {
+                path: path.to_owned(),
+                camera,
+                film,
+                objects: self.objects,
+                materials: self.materials,
+                lights,
+            },
+        }
+    }
+}
+
+fn displaced(
+    part: &str,
+    mesh: Arc<BaseMesh>,
+    map: &Arc<DisplacementMap>,
+    displacement: Displacement,
+) -> Result<Arc<DisplacedSurface>, AssetError> {
+    DisplacedSurface::new(mesh, map.clone(), displacement)
+        .map(Arc::new)
+        .map_err(|source| AssetError::Surface {
+            part: part.to_owned(),
+            source,
+        })
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .map_or_else(|| "mesh".into(), |s| s.to_string_lossy().into_owned())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,117 @@
+//! Pictures by file, each loaded once however often a scene names it.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::MapFile;
+use crate::image::{
+    self, Channel, ColorImage, ColorPixels, ColorSpace, EnvironmentImage, ImageError,
+};
+use crate::scene::error::AssetError;
+use crate::surface::{DisplacementMap, Wrap};
+
+/// What has been loaded so far.
+#[derive(Default)]
+pub(super) struct Assets {
+    heights: Vec<((PathBuf, Channel, Wrap), Arc<DisplacementMap>)>,
+    colors: Vec<((PathBuf, ColorSpace, Vec3), Arc<ColorImage>)>,
+    environments: Vec<(PathBuf, Arc<EnvironmentImage>)>,
+}
+
+impl Assets {
+    /// A channel of a picture as displacement map.
+    pub fn heights(
+        &mut self,
+        path: &Path,
+        channel: &Channel,
+        wrap: Wrap,
+    ) -> Result<Arc<DisplacementMap>, AssetError> {
+        let key = (identity(path), channel.clone(), wrap);
+        once(&mut self.heights, key, || image::load_heights(path, channel, wrap))
+    }
+
+    /// A colour picture, times `tint`.
+    pub fn color(
+        &mut self,
+        path: &Path,
+        space: ColorSpace,
+        tint: Vec3,
+    ) -> Result<Arc<ColorImage>, AssetError> {
+        let key = (identity(path), space, tint);
+        once(&mut self.colors, key, || {
+            Ok(tinted(image::load_color(path, space)?, tint))
+        })
+    }
+
+    /// An equirectangular light.
+    pub fn environment(&mut self, path: &Path) -> Result<Arc<EnvironmentImage>, AssetError> {
+        once(&mut self.environments, identity(path), || {
+            image::load_environment(path)
+        })
+    }
+
+    /// The displacement maps, in the order of their first use.
+    pub fn into_maps(self) -> Vec<MapFile> {
+        let maps = self.heights.into_iter();
+        maps.map(|((path, ..), map)| MapFile { path, map })
+            .collect()
+    }
+}
+
+/// What `known` has for `key`, else what `load` gives. A scene names few files: no hashing is needed.
+fn once<K: PartialEq, T>(
+    known: &mut Vec<(K, Arc<T>)>,
+    key: K,
+    load: impl FnOnce() -> Result<T, ImageError>,
+) -> Result<Arc<T>, AssetError> {
+    if let Some((_, asset)) = known.iter().find(|(k, _)| *k == key) {
+        return Ok(asset.clone());
+    }
+    let asset = Arc::new(load()?);
+    known.push((key, asset.clone()));
+    Ok(asset)
+}
+
+/// The same for every way to write a path; the path as it is where the file does not exist.
+fn identity(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}
+
+/// The sRGB picture that the mesh file at `path` holds, times `tint`.
+pub(super) fn embedded_color(
+    path: &Path,
+    bytes: &[u8],
+    tint: Vec3,
+) -> Result<Arc<ColorImage>, AssetError> {
+    let unpacked = tempfile::NamedTempFile::new().and_then(|mut file| {
+        file.write_all(bytes)?;
+        Ok(file)
+    });
+    let unpacked = unpacked.map_err(|source| AssetError::Unpack {
+        path: path.to_owned(),
+        source,
+    })?;
+    match image::load_color(unpacked.path(), ColorSpace::Srgb) {
+        Ok(image) => Ok(Arc::new(tinted(image, tint))),
+        Err(source) => Err(AssetError::Embedded {
+            path: path.to_owned(),
+            source,
+        }),
+    }
+}
+
+fn tinted(image: ColorImage, tint: Vec3) -> ColorImage {
+    if tint == Vec3::ONE {
+        return image;
+    }
+    let (width, height) = (image.width, image.height);
+    let pixels = (0..width * height).map(|i| (tint * image.pixel(i % width, i / width)).to_array());
+    ColorImage {
+        width,
+        height,
+        pixels: ColorPixels::Linear(pixels.collect()),
+    }
+}

@@ -1,0 +1,100 @@
+//! The camera that nobody placed: it frames the whole scene from a three-quarter view.
+
+use glam::{Vec3, Vec3A};
+
+use crate::ray::Aabb;
+use crate::scene::error::SceneError;
+use crate::scene::file::CameraTable;
+use crate::scene::{Camera, ObjectShape, SceneObject};
+
+/// From the middle of the scene to the eye: half from the right, a little from above.
+const THREE_QUARTER: Vec3 = Vec3::new(0.55, 0.45, 1.0);
+
+/// The box over all objects where they stand, grown by how far they are displaced.
+pub(super) fn bounds(objects: &[SceneObject]) -> Aabb {
+    let object = |object: &SceneObject| {
+        let (mesh, reach) = match &object.shape {
+            ObjectShape::Displaced(surface, _) => {
+                let (low, high) = surface.range();
+                (surface.mesh(), low.abs().max(high.abs()))
+            }
+            ObjectShape::Plain(mesh) => (mesh, 0.0),
+        };
+        let Aabb { min, max } = mesh.bounds();
+        let own = Aabb {
+            min: min - reach,
+            max: max + reach,
+        };
+        if object.instances.is_empty() {
+            return own;
+        }
+        let placed = object.instances.iter().flat_map(|transform| {
+            corners(own).map(|p| Vec3::from(transform.transform_point3a(Vec3A::from(p))))
+        });
+        placed.fold(Aabb::EMPTY, Aabb::including)
+    };
+    objects.iter().map(object).fold(Aabb::EMPTY, Aabb::union)
+}
+
+fn corners(Aabb { min, max }: Aabb) -> [Vec3; 8] {
+    std::array::from_fn(|i| {
+        let pick = |bit: usize, low: f32, high: f32| if i & bit == 0 { low } else { high };
+        Vec3::new(
+            pick(1, min.x, max.x),
+            pick(2, min.y, max.y),
+            pick(4, min.z, max.z),
+        )
+    })
+}
+
+/// The camera of a file, framed where it says nothing.
+pub(super) fn camera(table: &CameraTable, bounds: Aabb) -> Result<Camera, SceneError> {
+    let middle = 0.5 * (bounds.min + bounds.max);
+    let target = table.target.as_ref().map_or(middle, |t| t.value);
+    let position = table
+        .position
+        .as_ref()
+        .map_or_else(|| framing_eye(target, bounds, table.fov), |p| p.value);
+    let up = table.up.as_ref().map_or(Vec3::Y, |u| u.value);
+    let view = target - position;
+    let stated = [&table.target, &table.position, &table.up];
+    let culprit = stated.into_iter().flatten().next();
+    match (view.try_normalize(), culprit) {
+        (None, Some(at)) => {
+            let found = format!("the eye and the target both at {position}");
+            Err(at.refuse(found, "two different points"))
+        }
+        (Some(view), Some(at)) if view.cross(up.normalize()).length() < 1e-4 => {
+            let found = format!("a view along {view}, parallel to up = {up}");
+            let at = table.up.as_ref().unwrap_or(at);
+            Err(at.refuse(found, "camera.up in another direction than the view"))
+        }
+        _ => Ok(Camera {
+            position,
+            target,
+            up,
+            fov: table.fov,
+        }),
+    }
+}
+
+/// The camera of a scene without a file.
+pub(super) fn default_camera(bounds: Aabb) -> Camera {
+    let fov = CameraTable::default().fov;
+    let target = 0.5 * (bounds.min + bounds.max);
+    Camera {
+        position: framing_eye(target, bounds, fov),
+        target,
+        up: Vec3::Y,
+        fov,
+    }
+}
+
+/// The eye from which a field of view of `fov` radians around `target` just holds the sphere around the box.
+fn framing_eye(target: Vec3, bounds: Aabb, fov: f32) -> Vec3 {
+    let middle = 0.5 * (bounds.min + bounds.max);
+    let radius = 0.5 * bounds.diagonal() + middle.distance(target);
+    // A scene of one point has no size: any distance frames it.
+    let radius = if radius > 0.0 { radius } else { 1.0 };
+    target + THREE_QUARTER.normalize() * (radius / (0.5 * fov).sin())
+}

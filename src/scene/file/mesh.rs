@@ -1,0 +1,179 @@
+//! `[[mesh]]` and `[mesh.displacement]`.
+
+use std::path::{Path, PathBuf};
+
+use glam::{Affine3A, EulerRot, Quat, Vec3};
+
+use super::{Item, Keyed, STEP_TEXELS, SceneError, file_path, keyed, uv_transform, wrap};
+use crate::image::Channel;
+use crate::prism::{March, Step};
+use crate::surface::{UvTransform, Wrap};
+
+/// What `scale` of a displacement is.
+pub(in crate::scene) const SCALE: &str =
+    "scale, world units from height 0 to height 1: a number other than 0";
+
+/// One mesh as written.
+#[derive(Debug)]
+pub(in crate::scene) struct MeshTable {
+    /// Default: the file's stem.
+    pub name: Option<String>,
+    pub file: Keyed<PathBuf>,
+    /// Compute normals even where the file has some.
+    pub recompute_normals: bool,
+    /// Radians, for computed normals.
+    pub crease_angle: f32,
+    pub material: Option<Keyed<String>>,
+    pub mask: u32,
+    pub transform: Affine3A,
+    pub instances: Vec<Affine3A>,
+    pub displacement: Option<DisplacementTable>,
+}
+
+/// A displacement as written.
+#[derive(Debug)]
+pub(in crate::scene) struct DisplacementTable {
+    /// The table itself, for messages.
+    pub this: Keyed<()>,
+    /// Default: the map that the mesh file names; then what follows may be the file's, too.
+    pub map: Option<Keyed<PathBuf>>,
+    pub channel: Option<Channel>,
+    pub scale: Option<f32>,
+    pub midlevel: Option<f32>,
+    pub wrap: Option<Wrap>,
+    pub uv: Option<UvTransform>,
+    pub march: March,
+}
+
+impl MeshTable {
+    pub(super) fn read(item: Item, folder: &Path) -> Result<Self, SceneError> {
+        let mut section = item.section(&[
+            "name",
+            "file",
+            "normals",
+            "crease_angle",
+            "material",
+            "mask",
+            "transform",
+            "instances",
+            "displacement",
+        ])?;
+        let file = section.require("file", "the path of a mesh file")?;
+        let modes = [("file", false), ("smooth", true)];
+        Ok(Self {
+            name: section.optional("name", |i| Ok(i.text("a name, in quotes")?.to_owned()))?,
+            file: file_path(&file, folder)?,
+            recompute_normals: section
+                .optional("normals", |i| i.word(&modes))?
+                .unwrap_or(false),
+            crease_angle: section
+                .optional("crease_angle", |i| {
+                    i.number("degrees from 0 to 180", |x| (0.0..=180.0).contains(&x))
+                })?
+                .map_or(std::f32::consts::PI, f32::to_radians),
+            material: section.optional("material", |i| {
+                Ok(keyed(&i, i.text("the name of a [[material]]")?.to_owned()))
+            })?,
+            mask: section
+                .optional("mask", |i| i.integer(0..=u32::MAX))?
+                .unwrap_or(u32::MAX),
+            transform: section.optional("transform", transform)?.unwrap_or_default(),
+            instances: section.optional("instances", instances)?.unwrap_or_default(),
+            displacement: section.optional("displacement", |i| {
+                DisplacementTable::read(i, folder)
+            })?,
+        })
+    }
+}
+
+impl DisplacementTable {
+    fn read(item: Item, folder: &Path) -> Result<Self, SceneError> {
+        let this = keyed(&item, ());
+        let mut section = item.section(&[
+            "map", "channel", "scale", "midlevel", "wrap", "uv", "march", "dt", "dt_world",
+            "jitter",
+        ])?;
+        // There is one march so far: the word is checked, and says nothing else.
+        section.optional("march", |i| i.word(&[("uniform", ())]))?;
+        let step = step(&mut section)?;
+        let jitter = section.optional("jitter", |i| i.boolean())?;
+        Ok(Self {
+            this,
+            map: section.optional("map", |i| file_path(&i, folder))?,
+            channel: section.optional("channel", channel)?,
+            scale: section.optional("scale", |i| i.number(SCALE, |x| x != 0.0))?,
+            midlevel: section.optional("midlevel", |i| i.number("a height", |_| true))?,
+            wrap: section.optional("wrap", wrap)?,
+            uv: section.optional("uv", uv_transform)?,
+            march: March::Uniform {
+                step,
+                jitter: jitter.unwrap_or(false),
+            },
+        })
+    }
+}
+
+fn channel(item: Item) -> Result<Channel, SceneError> {
+    let expected = "\"luminance\", \"r\", \"g\", \"b\", \"a\" or the name of an EXR channel";
+    let Ok(channel) = item.text(expected)?.parse();
+    Ok(channel)
+}
+
+/// `dt` or `dt_world`; 1 texel by default.
+fn step(section: &mut super::Section) -> Result<Step, SceneError> {
+    let texels = section.optional("dt", |i| {
+        let (low, high) = (STEP_TEXELS.start(), STEP_TEXELS.end());
+        let expected = format!("texels per step, from {low} to {high}");
+        i.number(&expected, |x| STEP_TEXELS.contains(&x))
+    })?;
+    let Some(item) = section.get("dt_world") else {
+        return Ok(Step::Texels(texels.unwrap_or(1.0)));
+    };
+    if texels.is_some() {
+        return Err(item.error("dt and dt_world", "only one of them"));
+    }
+    let length = item.number("world units per step, above 0", |x| x > 0.0)?;
+    Ok(Step::World(length))
+}
+
+fn instances(item: Item) -> Result<Vec<Affine3A>, SceneError> {
+    let expected = "at least one transform, like { translate = [1, 0, 0] }";
+    let none = item.error("an empty array", expected);
+    let items = item.items(expected)?;
+    if items.is_empty() {
+        return Err(none);
+    }
+    items.into_iter().map(transform).collect()
+}
+
+/// Scaled, then turned about x, y and z in this order, then moved.
+fn transform(item: Item) -> Result<Affine3A, SceneError> {
+    let mut section = item.section(&["translate", "rotate", "scale"])?;
+    let translate = section.optional("translate", |i| i.vec3("[x, y, z]", |_| true))?;
+    let rotate = section.optional("rotate", |i| {
+        i.vec3("degrees about x, y and z, [x, y, z]", |_| true)
+    })?;
+    let scale = section.optional("scale", scale)?;
+    let degrees = rotate.unwrap_or(Vec3::ZERO);
+    let [x, y, z] = degrees.to_array().map(f32::to_radians);
+    Ok(Affine3A::from_scale_rotation_translation(
+        scale.unwrap_or(Vec3::ONE),
+        Quat::from_euler(EulerRot::ZYX, z, y, x),
+        translate.unwrap_or(Vec3::ZERO),
+    ))
+}
+
+/// One factor, or one per axis; none is zero, or nothing would be left to hit.
+fn scale(item: Item) -> Result<Vec3, SceneError> {
+    /// Beyond these, squares and products of f32 lengths vanish or overflow.
+    const FACTOR: std::ops::RangeInclusive<f32> = 1e-9..=1e9;
+    let expected = "a factor or [x, y, z], none of them 0 (1e-9 to 1e9 in size)";
+    if item.is_array() {
+        item.vec3(expected, |v| {
+            v.abs().to_array().iter().all(|x| FACTOR.contains(x))
+        })
+    } else {
+        let factor = item.number(expected, |x| FACTOR.contains(&x.abs()))?;
+        Ok(Vec3::splat(factor))
+    }
+}

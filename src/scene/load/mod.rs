@@ -1,0 +1,322 @@
+//! Mesh files: OBJ with MTL, glTF and GLB, PLY.
+//!
+//! One file gives one [`Part`] per material (and one more where only some faces of a material have texture
+//! coordinates). Within a part the faces stand in file order, so an OBJ of triangles with one material is
+//! one part whose triangle k is the file's face k. Polygons are cut into fans from their first corner.
+//! Texture coordinates come out with v up, whatever the format's habit.
+
+mod gltf;
+mod mtl;
+mod obj;
+mod ply;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+use thiserror::Error;
+
+use crate::surface::{MeshBuilder, UvTransform, Wrap};
+
+/// Endings of the files that [`load_mesh`] reads.
+pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
+
+/// Why a mesh file was refused.
+#[derive(Debug, Error)]
+#[error("{}: {kind}", path.display())]
+pub struct LoadMeshError {
+    /// The file that was asked for.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    #[source]
+    pub kind: LoadMeshErrorKind,
+}
+
+/// What is wrong with a mesh file.
+#[derive(Debug, Error)]
+pub enum LoadMeshErrorKind {
+    /// The file, or one it names, cannot be read.
+    #[error("cannot read {what}: {source}")]
+    Read {
+        /// `the file`, or the name of the file it needs.
+        what: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// No byte in it.
+    #[error("the file is empty")]
+    Empty,
+    /// Not a format that is read.
+    #[error("unknown mesh format {found:?}; supported are .obj, .gltf, .glb and .ply")]
+    UnknownExtension {
+        /// The ending, without the dot.
+        found: String,
+    },
+    /// A text file with bytes that are no text.
+    #[error("line {line} is not UTF-8 text; is this an OBJ file?")]
+    NotText {
+        /// From 1.
+        line: usize,
+    },
+    /// The text does not follow the format.
+    #[error("line {line}: found {found:?}; expected {expected}")]
+    Syntax {
+        /// From 1.
+        line: usize,
+        /// The offending statement or word.
+        found: String,
+        /// What should stand there.
+        expected: &'static str,
+    },
+    /// A face refers to something that is not there.
+    #[error("{place}: {what} {index} is out of range; there are {count}{counted}")]
+    IndexOutOfRange {
+        /// Line, face or primitive.
+        place: String,
+        /// Vertex, texture coordinate or normal.
+        what: &'static str,
+        /// The index as the file has it.
+        index: i64,
+        /// How many there are.
+        count: usize,
+        /// How the format counts.
+        counted: &'static str,
+    },
+    /// Broken structure of a glTF or PLY file.
+    #[error("{what}: {problem}")]
+    Malformed {
+        /// The element: header, accessor, line ...
+        what: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Sound, but beyond this reader.
+    #[error("{what} is not supported")]
+    Unsupported {
+        /// The feature.
+        what: String,
+    },
+    /// Nothing to trace.
+    #[error("the file holds no faces")]
+    NoFaces,
+}
+
+/// A mesh file as read: not yet validated, nothing computed.
+#[derive(Debug, Default)]
+pub struct LoadedFile {
+    /// At least one, each with at least one triangle.
+    pub parts: Vec<Part>,
+    /// What was ignored and why, one line each, for the user.
+    pub warnings: Vec<String>,
+}
+
+/// The faces of one material.
+#[derive(Debug)]
+pub struct Part {
+    /// Name of its first object or group, or the file's stem.
+    pub name: String,
+    /// The faces, in file order.
+    pub mesh: MeshBuilder,
+    /// The file's material, if it gives one.
+    pub material: Option<FileMaterial>,
+}
+
+/// What a mesh file says of a material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileMaterial {
+    /// Its name, perhaps empty.
+    pub name: String,
+    /// Linear RGB; multiplies the texture.
+    pub base_color: Vec3,
+    /// Colour texture, sRGB.
+    pub base_color_texture: Option<FileTexture>,
+    /// 0 dielectric .. 1 metal, where the format says.
+    pub metallic: Option<f32>,
+    /// 0 mirror .. 1, where the format says.
+    pub roughness: Option<f32>,
+    /// The displacement map, where the format knows one (MTL).
+    pub displacement: Option<FileDisplacement>,
+}
+
+/// A texture by path or by value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FileTexture {
+    /// A picture file; not checked to exist.
+    Path(PathBuf),
+    /// The bytes of a PNG or JPEG file that the mesh file holds.
+    Embedded(Vec<u8>),
+}
+
+/// A displacement map that a mesh file names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileDisplacement {
+    /// The picture file; not checked to exist.
+    pub path: PathBuf,
+    /// World units per unit of height, if the file says.
+    pub scale: Option<f32>,
+    /// The height that displaces by nothing, if the file says.
+    pub midlevel: Option<f32>,
+    /// Applied to the texture coordinates.
+    pub uv: UvTransform,
+    /// If the file says.
+    pub wrap: Option<Wrap>,
+    /// `r`, `g`, `b`, `a` or `luminance`, if the file says.
+    pub channel: Option<&'static str>,
+}
+
+/// Reads a mesh file; the format goes by the ending.
+///
+/// # Errors
+///
+/// [`LoadMeshError`], which names the file. Numbers that are NaN or infinite are left to
+/// [`MeshBuilder::build`], which names the vertex.
+pub fn load_mesh(path: &Path) -> Result<LoadedFile, LoadMeshError> {
+    read(path).map_err(|kind| LoadMeshError {
+        path: path.to_owned(),
+        kind,
+    })
+}
+
+impl LoadedFile {
+    /// All parts as one mesh, part after part; the materials are dropped.
+    pub fn into_single_mesh(self) -> MeshBuilder {
+        let mut whole = MeshBuilder::default();
+        for part in self.parts {
+            whole.append(part.mesh);
+        }
+        whole
+    }
+}
+
+fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
+    if !MESH_EXTENSIONS.contains(&extension.as_str()) {
+        return Err(LoadMeshErrorKind::UnknownExtension { found: extension });
+    }
+    let bytes = std::fs::read(path).map_err(|source| LoadMeshErrorKind::Read {
+        what: "the file".into(),
+        source,
+    })?;
+    if bytes.is_empty() {
+        return Err(LoadMeshErrorKind::Empty);
+    }
+    let mut file = match extension.as_str() {
+        "obj" => obj::read(&bytes, path)?,
+        "ply" => ply::read(&bytes)?,
+        _ => gltf::read(&bytes, path)?,
+    };
+    if file.parts.is_empty() {
+        return Err(LoadMeshErrorKind::NoFaces);
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    for part in file.parts.iter_mut().filter(|p| p.name.is_empty()) {
+        part.name = stem.clone().into_owned();
+    }
+    Ok(file)
+}
+
+/// Sorts meshes into parts by material and by whether they have texture coordinates.
+#[derive(Default)]
+struct Parts {
+    parts: Vec<Part>,
+    /// Per part, the material's index in the file.
+    materials: Vec<Option<usize>>,
+    by_key: HashMap<(Option<usize>, bool), usize>,
+}
+
+impl Parts {
+    /// Adds faces; a mesh without faces is forgotten.
+    fn add(&mut self, name: &str, material: Option<usize>, mesh: MeshBuilder) {
+        if mesh.triangles.is_empty() {
+            return;
+        }
+        let key = (material, mesh.texcoords.is_empty());
+        let index = *self.by_key.entry(key).or_insert(self.parts.len());
+        if index == self.parts.len() {
+            self.materials.push(material);
+            self.parts.push(Part {
+                name: name.to_owned(),
+                mesh,
+                material: None,
+            });
+        } else {
+            self.parts[index].mesh.append(mesh);
+        }
+    }
+
+    /// The parts, each with its material looked up.
+    fn finish(self, material: impl Fn(usize) -> Option<FileMaterial>) -> Vec<Part> {
+        let mut parts = self.parts;
+        for (part, index) in parts.iter_mut().zip(self.materials) {
+            part.material = index.and_then(&material);
+        }
+        parts
+    }
+}
+
+/// A relative path as asset files write it (either slash), next to the file that names it.
+fn beside(file: &Path, name: &str) -> PathBuf {
+    let name = name.replace('\\', "/");
+    file.parent().unwrap_or(Path::new("")).join(name)
+}
+
+/// The triangles of a polygon, from its first corner.
+fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    corners
+        .windows(2)
+        .skip(1)
+        .map(|pair| [corners[0], pair[0], pair[1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writes `bytes` to a file of that name in a fresh folder and loads it.
+    pub(super) fn load_bytes(name: &str, bytes: &[u8]) -> Result<LoadedFile, LoadMeshError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let result = load_mesh(&path);
+        if let Err(e) = &result {
+            assert!(e.to_string().contains(name), "{e} does not name the file");
+        }
+        result
+    }
+
+    #[test]
+    fn an_unknown_ending_lists_the_known_ones() {
+        for name in ["mesh.fbx", "mesh"] {
+            let message = load_bytes(name, b"x").unwrap_err().to_string();
+            for known in MESH_EXTENSIONS {
+                assert!(message.contains(known), "{message}");
+            }
+        }
+    }
+
+    #[test]
+    fn missing_and_empty_files_are_refused() {
+        let missing = load_mesh(Path::new("no/such/mesh.obj")).unwrap_err();
+        assert!(matches!(missing.kind, LoadMeshErrorKind::Read { .. }));
+        for known in MESH_EXTENSIONS {
+            let empty = load_bytes(&format!("mesh.{known}"), b"").unwrap_err();
+            assert!(matches!(empty.kind, LoadMeshErrorKind::Empty));
+        }
+    }
+
+    #[test]
+    fn the_ending_may_be_in_capitals() {
+        let file = load_bytes("MESH.OBJ", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        assert_eq!(file.parts[0].name, "MESH");
+    }
+
+    #[test]
+    fn fans_cover_a_polygon() {
+        let cut: Vec<_> = fan(&[7, 8, 9, 4, 5]).collect();
+        assert_eq!(cut, [[7, 8, 9], [7, 9, 4], [7, 4, 5]]);
+        assert_eq!(fan(&[1, 2]).count(), 0);
+    }
+}

@@ -1,0 +1,638 @@
+//! Wavefront OBJ through tobj.
+//!
+//! tobj says nothing of lines, takes an index that resolves to -1 for a missing one, drops faces of one or
+//! two corners, makes triangles of polylines, and knows no continued lines. So the text is first checked
+//! and rewritten into the plain statements that it reads without surprise.
+
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use glam::{Vec2, Vec3};
+
+use super::{FileMaterial, LoadMeshErrorKind, LoadedFile, Parts, mtl};
+use crate::surface::MeshBuilder;
+
+/// tobj's name for faces before any `o` or `g`.
+const UNNAMED: &str = "unnamed_object";
+
+const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
+    single_index: true,
+    triangulate: true,
+    ignore_points: true,
+    ignore_lines: true,
+};
+
+/// Reads the bytes of the file at `path`.
+pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+    let text = std::str::from_utf8(bytes).map_err(|e| LoadMeshErrorKind::NotText {
+        line: 1 + bytes[..e.valid_up_to()]
+            .iter()
+            .filter(|&&b| b == b'\n')
+            .count(),
+    })?;
+    let plain = Plain::new(text)?;
+    let libraries = RefCell::new(Libraries::new(path));
+    let mut reader = CountingReader::new(plain.text.as_bytes());
+    let loaded = tobj::load_obj_buf(&mut reader, &OPTIONS, |name| {
+        libraries.borrow_mut().load(name)
+    });
+    let (models, materials) = loaded.map_err(|e| plain.fault(text, reader.lines, e))?;
+    let libraries = libraries.into_inner();
+    let mut warnings = libraries.warnings;
+    // Without any library the loader has warned already.
+    let materials = materials.unwrap_or_default();
+    for name in &plain.materials {
+        if !materials.is_empty() && !materials.iter().any(|m| m.name == *name) {
+            warnings.push(format!("material {name:?} is in no material library"));
+        }
+    }
+    let several = models.len() > 1;
+    let mut parts = Parts::default();
+    for model in models {
+        let name = if model.name == UNNAMED {
+            ""
+        } else {
+            &model.name
+        };
+        parts.add(name, model.mesh.material_id, builder(&model.mesh));
+    }
+    let materials: Vec<FileMaterial> = materials
+        .iter()
+        .zip(&libraries.of_material)
+        .map(|(m, library)| mtl::material(m, library))
+        .collect();
+    let mut parts = parts.finish(|index| materials.get(index).cloned());
+    if several {
+        for part in &mut parts {
+            share_vertices(&mut part.mesh);
+        }
+    }
+    Ok(LoadedFile { parts, warnings })
+}
+
+fn builder(mesh: &tobj::Mesh) -> MeshBuilder {
+    // A model's faces are alike in what they have (`Plain` sees to it), so the arrays are full or empty.
+    MeshBuilder {
+        positions: mesh
+            .positions
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&p| Vec3::from(p))
+            .collect(),
+        normals: mesh
+            .normals
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&n| Vec3::from(n))
+            .collect(),
+        texcoords: mesh
+            .texcoords
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&t| Vec2::from(t))
+            .collect(),
+        triangles: mesh.indices.as_chunks().0.to_vec(),
+    }
+}
+
+/// Makes vertices one that are alike bit for bit: tobj shares vertices within a group only.
+fn share_vertices(mesh: &mut MeshBuilder) {
+    let old = std::mem::take(mesh);
+    let mut seen = HashMap::with_capacity(old.positions.len());
+    let new_index: Vec<u32> = (0..old.positions.len())
+        .map(|i| {
+            let position = old.positions[i];
+            let normal = old.normals.get(i);
+            let texcoord = old.texcoords.get(i);
+            let key = (
+                position.to_array().map(f32::to_bits),
+                normal.map(|n| n.to_array().map(f32::to_bits)),
+                texcoord.map(|t| t.to_array().map(f32::to_bits)),
+            );
+            *seen.entry(key).or_insert_with(|| {
+                mesh.positions.push(position);
+                mesh.normals.extend(normal);
+                mesh.texcoords.extend(texcoord);
+                (mesh.positions.len() - 1) as u32
+            })
+        })
+        .collect();
+    mesh.triangles = old
+        .triangles
+        .iter()
+        .map(|t| t.map(|i| new_index[i as usize]))
+        .collect();
+}
+
+/// The material libraries that were asked for.
+struct Libraries<'a> {
+    obj: &'a Path,
+    warnings: Vec<String>,
+    /// Per material in tobj's order, its library.
+    of_material: Vec<PathBuf>,
+}
+
+impl<'a> Libraries<'a> {
+    fn new(obj: &'a Path) -> Self {
+        Self {
+            obj,
+            warnings: Vec::new(),
+            of_material: Vec::new(),
+        }
+    }
+
+    /// `name` is one file whose name may hold spaces, or several files.
+    fn load(&mut self, name: &Path) -> tobj::MTLLoadResult {
+        let name = name.to_string_lossy();
+        let whole = super::beside(self.obj, &name);
+        let files: Vec<PathBuf> = if whole.is_file() {
+            vec![whole]
+        } else {
+            let words = name.split_whitespace();
+            words.map(|n| super::beside(self.obj, n)).collect()
+        };
+        let mut materials = Vec::new();
+        let mut by_name = None;
+        for file in files {
+            let (mut found, names) = self.load_file(&file)?;
+            let offset = materials.len();
+            self.of_material.extend(found.iter().map(|_| file.clone()));
+            materials.append(&mut found);
+            let all = by_name.get_or_insert_with(Default::default);
+            merge(all, names, offset);
+        }
+        Ok((materials, by_name.unwrap_or_default()))
+    }
+
+    fn load_file(&mut self, file: &Path) -> tobj::MTLLoadResult {
+        let bytes = std::fs::read(file).unwrap_or_else(|e| {
+            let shown = file.display();
+            self.warnings
+                .push(format!("cannot read the material library {shown}: {e}"));
+            Vec::new()
+        });
+        let text = String::from_utf8_lossy(&bytes);
+        let cleaned = mtl::clean(&text, file, &mut self.warnings);
+        tobj::load_mtl_buf(&mut cleaned.as_bytes())
+    }
+}
+
+fn merge<M>(all: &mut M, names: M, offset: usize)
+where
+    M: IntoIterator<Item = (String, usize)> + Extend<(String, usize)>,
+{
+    all.extend(
+        names
+            .into_iter()
+            .map(|(name, index)| (name, index + offset)),
+    );
+}
+
+/// How many of each element have been defined.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    v: usize,
+    vt: usize,
+    vn: usize,
+}
+
+impl Counts {
+    fn count(&mut self, keyword: &str) {
+        match keyword {
+            "v" => self.v += 1,
+            "vt" => self.vt += 1,
+            "vn" => self.vn += 1,
+            _ => {}
+        }
+    }
+}
+
+/// The checked and rewritten text.
+struct Plain {
+    text: String,
+    /// Per line of `text`, its line in the file, from 1.
+    lines: Vec<usize>,
+    /// Names after `usemtl`.
+    materials: BTreeSet<String>,
+}
+
+impl Plain {
+    fn new(text: &str) -> Result<Self, LoadMeshErrorKind> {
+        let mut plain = Self {
+            text: String::with_capacity(text.len()),
+            lines: Vec::new(),
+            materials: BTreeSet::new(),
+        };
+        let mut total = Counts::default();
+        for (_, line) in statements(text) {
+            total.count(line.split_whitespace().next().unwrap_or(""));
+        }
+        let mut so_far = Counts::default();
+        // tobj keeps one array of normals per group: faces that differ in what they have must not share one.
+        let mut group = UNNAMED.to_owned();
+        let mut layout = None;
+        for (number, line) in statements(text) {
+            let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((&line, ""));
+            let rest = rest.trim();
+            so_far.count(keyword);
+            match keyword {
+                "v" => plain.push(number, "v", &coordinates(rest, 3)),
+                "vn" => plain.push(number, "vn", &coordinates(rest, 3)),
+                "vt" => plain.push(number, "vt", &coordinates(rest, 2)),
+                "o" | "g" => {
+                    group = if rest.is_empty() { UNNAMED } else { rest }.to_owned();
+                    plain.push(number, "g", &group);
+                }
+                "usemtl" if !rest.is_empty() => {
+                    plain.materials.insert(rest.to_owned());
+                    plain.push(number, "usemtl", rest);
+                }
+                "mtllib" => plain.push(number, "mtllib", rest),
+                "f" | "fo" => {
+                    let this = Some(check_face(number, rest, so_far, total)?);
+                    if layout.is_some() && layout != this {
+                        plain.push(number, "g", &group);
+                    }
+                    layout = this;
+                    plain.push(number, "f", rest);
+                }
+                _ => {}
+            }
+        }
+        Ok(plain)
+    }
+
+    fn push(&mut self, number: usize, keyword: &str, rest: &str) {
+        // Writing to a String cannot fail.
+        let _ = writeln!(self.text, "{keyword} {rest}");
+        self.lines.push(number);
+    }
+
+    /// tobj's error after `read` lines, in the file's terms.
+    fn fault(&self, text: &str, read: usize, error: tobj::LoadError) -> LoadMeshErrorKind {
+        use tobj::LoadError as E;
+        let line = read
+            .checked_sub(1)
+            .and_then(|i| self.lines.get(i).copied())
+            .unwrap_or(0);
+        let expected = match error {
+            E::PositionParseError => "`v` and 3 numbers",
+            E::NormalParseError => "`vn` and 3 numbers",
+            E::TexcoordParseError => "`vt` and 1 to 3 numbers",
+            E::ScalingByZeroError => "a weight w other than 0",
+            _ => {
+                return LoadMeshErrorKind::Malformed {
+                    what: format!("line {line}"),
+                    problem: error.to_string(),
+                };
+            }
+        };
+        let found = text.lines().nth(line.saturating_sub(1)).unwrap_or("");
+        LoadMeshErrorKind::Syntax {
+            line,
+            found: found.trim().to_owned(),
+            expected,
+        }
+    }
+}
+
+/// The statements without comments, continued lines joined, each with the number of its first line.
+fn statements(text: &str) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)> {
+    let mut lines = text.lines().enumerate();
+    std::iter::from_fn(move || {
+        let (number, first) = lines.next()?;
+        let mut whole = std::borrow::Cow::Borrowed(uncommented(first));
+        while whole.ends_with('\\') {
+            let joined = whole.to_mut();
+            joined.pop();
+            joined.push(' ');
+            match lines.next() {
+                Some((_, next)) => joined.push_str(uncommented(next)),
+                None => break,
+            }
+        }
+        Some((number + 1, whole))
+    })
+}
+
+/// Names may hold a `#`; a comment is a `#` at the start or after a blank.
+fn uncommented(line: &str) -> &str {
+    let start = line
+        .match_indices('#')
+        .map(|(i, _)| i)
+        .find(|&i| line[..i].ends_with(char::is_whitespace) || i == 0);
+    line[..start.unwrap_or(line.len())].trim()
+}
+
+/// The numbers that are read: a position keeps a fourth (its weight) but no colours, a missing v is 0.
+fn coordinates(rest: &str, wanted: usize) -> String {
+    let mut words: Vec<&str> = rest.split_whitespace().collect();
+    if words.len() != 4 || wanted != 3 {
+        words.truncate(wanted);
+    }
+    if wanted == 2 && words.len() == 1 {
+        words.push("0");
+    }
+    words.join(" ")
+}
+
+/// Which of (texture coordinate, normal) the corners of a face have; all of them must agree.
+fn check_face(
+    line: usize,
+    rest: &str,
+    so_far: Counts,
+    total: Counts,
+) -> Result<[bool; 2], LoadMeshErrorKind> {
+    let syntax = |found: &str, expected| LoadMeshErrorKind::Syntax {
+        line,
+        found: found.to_owned(),
+        expected,
+    };
+    let mut layout = None;
+    let mut corners = 0;
+    for corner in rest.split_whitespace() {
+        let mut parts = corner.split('/');
+        let [v, vt, vn] = [(); 3].map(|()| parts.next().unwrap_or(""));
+        if v.is_empty() || parts.next().is_some() {
+            return Err(syntax(corner, "v, v/vt, v//vn or v/vt/vn"));
+        }
+        let checks = [
+            ("vertex", v, so_far.v, total.v),
+            ("texture coordinate", vt, so_far.vt, total.vt),
+            ("normal", vn, so_far.vn, total.vn),
+        ];
+        for (what, text, so_far, total) in checks {
+            if text.is_empty() {
+                continue;
+            }
+            let index: i64 = text
+                .parse()
+                .map_err(|_| syntax(corner, "whole numbers as indices"))?;
+            // Negative indices count back from the last one defined so far.
+            let good = match index {
+                1.. => index as u64 <= total as u64,
+                _ => index != 0 && index.unsigned_abs() <= so_far as u64,
+            };
+            if !good {
+                return Err(LoadMeshErrorKind::IndexOutOfRange {
+                    place: format!("line {line}"),
+                    what,
+                    index,
+                    count: if index < 0 { so_far } else { total },
+                    counted: " (counted from 1)",
+                });
+            }
+        }
+        let this = [!vt.is_empty(), !vn.is_empty()];
+        if *layout.get_or_insert(this) != this {
+            return Err(syntax(rest, "corners that are all of one kind"));
+        }
+        corners += 1;
+    }
+    layout
+        .filter(|_| corners >= 3)
+        .ok_or_else(|| syntax(&format!("f {rest}"), "a face of at least 3 corners"))
+}
+
+/// Counts the lines that went through.
+struct CountingReader<'a> {
+    rest: &'a [u8],
+    lines: usize,
+}
+
+impl<'a> CountingReader<'a> {
+    fn new(rest: &'a [u8]) -> Self {
+        Self { rest, lines: 0 }
+    }
+}
+
+impl std::io::Read for CountingReader<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        self.rest.read(buffer)
+    }
+}
+
+impl std::io::BufRead for CountingReader<'_> {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        Ok(self.rest)
+    }
+
+    fn consume(&mut self, amount: usize) {
+        let (gone, rest) = self.rest.split_at(amount);
+        self.lines += gone.iter().filter(|&&b| b == b'\n').count();
+        self.rest = rest;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::load_bytes;
+    use super::super::{FileTexture, load_mesh};
+    use super::*;
+    use crate::surface::{MeshError, NormalMode};
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    fn load(statements: &str) -> Result<LoadedFile, LoadMeshErrorKind> {
+        load_bytes("m.obj", format!("{SQUARE}{statements}").as_bytes()).map_err(|e| e.kind)
+    }
+
+    fn only(statements: &str) -> MeshBuilder {
+        let mut file = load(statements).unwrap();
+        assert_eq!(file.parts.len(), 1);
+        assert!(file.warnings.is_empty(), "{:?}", file.warnings);
+        file.parts.remove(0).mesh
+    }
+
+    #[test]
+    fn polygons_become_fans_over_shared_vertices() {
+        let mesh = only("f 1 2 3 4\n");
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(mesh.positions.len(), 4);
+        assert!(mesh.normals.is_empty() && mesh.texcoords.is_empty());
+    }
+
+    #[test]
+    fn negative_indices_count_back() {
+        let mesh = only("f -4 -3 -2 -1\n");
+        assert_eq!(mesh.positions[0], Vec3::ZERO);
+        assert_eq!(mesh.positions[3], Vec3::Y);
+    }
+
+    #[test]
+    fn corners_share_a_vertex_exactly_when_all_their_indices_agree() {
+        let mesh = only(
+            "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/2/1 4/4/1\n",
+        );
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 3, 4]]);
+        assert_eq!(mesh.texcoords[2], Vec2::ONE);
+        assert_eq!(mesh.texcoords[3], Vec2::X);
+        assert_eq!(mesh.normals, [Vec3::Z; 5]);
+    }
+
+    #[test]
+    fn groups_of_one_material_are_one_part_in_file_order() {
+        let mesh = only("g a\nf 1 2 3\ng b\nf 3 4 1\no c\nf 2 3 4\n");
+        assert_eq!(mesh.triangles, [[0, 1, 2], [2, 3, 0], [1, 2, 3]]);
+        assert_eq!(mesh.positions.len(), 4);
+    }
+
+    #[test]
+    fn normals_may_be_missing_on_some_faces() {
+        let mesh = only("vn 1 0 0\nf 1//1 2//1 3//1\nf 1 3 4\n");
+        assert_eq!(mesh.triangles.len(), 2);
+        assert_eq!(mesh.normals[0], Vec3::X);
+        assert_eq!(mesh.normals[mesh.triangles[1][0] as usize], Vec3::ZERO);
+    }
+
+    #[test]
+    fn faces_with_and_without_texture_coordinates_are_two_parts() {
+        let file = load("vt 0 0\nf 1/1 2/1 3/1\nf 1 3 4\n").unwrap();
+        assert_eq!(file.parts.len(), 2);
+        assert_eq!(file.parts[0].mesh.texcoords.len(), 3);
+        assert!(file.parts[1].mesh.texcoords.is_empty());
+        let whole = file.into_single_mesh();
+        assert_eq!(whole.triangles.len(), 2);
+        assert!(whole.texcoords.is_empty());
+    }
+
+    #[test]
+    fn comments_colours_continued_lines_and_polylines_are_understood() {
+        let text = "# c\nv 0 0 0 1 0 0\nv 2 0 0 2\nv 0 1 0\nl 1 2 3\np 1\nvt 0.5\n\
+                    f 1/1 2/1 \\\n3/1 # last\n";
+        let file = load_bytes("m.obj", text.as_bytes()).unwrap();
+        let mesh = &file.parts[0].mesh;
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
+        assert_eq!(mesh.positions[1], Vec3::X);
+        assert_eq!(mesh.texcoords[0], Vec2::new(0.5, 0.0));
+    }
+
+    #[test]
+    fn indices_out_of_range_name_the_line() {
+        for (face, what, index, count) in [
+            ("f 1 2 5", "vertex", 5, 4),
+            ("f 1 2 0", "vertex", 0, 4),
+            ("f 1 2 -5", "vertex", -5, 4),
+            ("f 1/1 2/1 3/1", "texture coordinate", 1, 0),
+            ("f 1//-9 2//-9 3//-9", "normal", -9, 0),
+            (
+                "f 1/-9223372036854775808 2/1 3/1",
+                "texture coordinate",
+                i64::MIN,
+                0,
+            ),
+        ] {
+            match load(&format!("{face}\n")) {
+                Err(LoadMeshErrorKind::IndexOutOfRange {
+                    place,
+                    what: found_what,
+                    index: found,
+                    count: found_count,
+                    ..
+                }) => {
+                    assert_eq!(place, "line 5");
+                    assert_eq!((found_what, found, found_count), (what, index, count));
+                }
+                other => panic!("{face}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn broken_statements_name_the_line() {
+        for text in [
+            "f 1 2\n",
+            "f\n",
+            "f 1 2 x\n",
+            "f 1 2 3/\u{2f}/\u{2f}\n",
+            "f 1 2 99999999999999999999\n",
+            "vt 1 1\nf 1/1 2 3\n",
+            "v 1 2\n",
+            "v 1 2 three\n",
+            "v 1 2 3 0\n",
+            "vn 1 2\n",
+            "vt\n",
+        ] {
+            match load(text) {
+                Err(LoadMeshErrorKind::Syntax { line, .. }) => assert!(line == 5 || line == 6),
+                other => panic!("{text:?}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_cut_off_anywhere_never_panics() {
+        let text = format!("{SQUARE}vt 0 1\nvn 0 0 1\ng a\nf 1/1/1 2/1/1 3/1/1 4/1/1\n");
+        for length in 0..text.len() {
+            let _ = load_bytes("m.obj", &text.as_bytes()[..length]);
+        }
+    }
+
+    #[test]
+    fn files_without_faces_or_text_are_refused() {
+        assert!(matches!(load(""), Err(LoadMeshErrorKind::NoFaces)));
+        let binary = load_bytes("m.obj", b"v 0 0 0\n\xff\xfe\n").unwrap_err();
+        assert!(matches!(
+            binary.kind,
+            LoadMeshErrorKind::NotText { line: 2 }
+        ));
+    }
+
+    #[test]
+    fn nan_is_left_to_the_builder_which_names_the_vertex() {
+        let file = load_bytes("m.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let error = file.into_single_mesh().build(NormalMode::File).unwrap_err();
+        assert!(matches!(error, MeshError::NotFinite { vertex: 1, .. }));
+    }
+
+    #[test]
+    fn a_missing_library_is_a_warning() {
+        let file = load("mtllib none.mtl\nusemtl rock\nf 1 2 3\n").unwrap();
+        assert_eq!(file.warnings.len(), 1, "{:?}", file.warnings);
+        assert!(file.warnings[0].contains("none.mtl"));
+        assert!(file.parts[0].material.is_none());
+    }
+
+    #[test]
+    fn materials_part_the_faces_and_bring_their_maps() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(
+            folder.path().join("my lib.mtl"),
+            "newmtl rock\nKd 0.5 0.25 1\nmap_Kd rock color.png\nmap_bump ignored.png\n\
+             disp -mm -1 2 rock height.png\nnewmtl moss\nbump -bm 0.5 moss.png\n",
+        )
+        .unwrap();
+        let path = folder.path().join("m.obj");
+        let text = format!(
+            "mtllib my lib.mtl\n{SQUARE}usemtl rock\nf 1 2 3\nusemtl moss\nf 1 3 4\nusemtl rock\nf 2 3 4\n\
+             usemtl lost\nf 1 2 4\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        let file = load_mesh(&path).unwrap();
+        assert_eq!(
+            file.warnings,
+            ["material \"lost\" is in no material library"]
+        );
+        let faces: Vec<usize> = file.parts.iter().map(|p| p.mesh.triangles.len()).collect();
+        assert_eq!(faces, [2, 1, 1]);
+        // The two rock faces share an edge, though other faces stand between them.
+        assert_eq!(file.parts[0].mesh.positions.len(), 4);
+        let rock = file.parts[0].material.as_ref().unwrap();
+        assert_eq!(rock.base_color, Vec3::new(0.5, 0.25, 1.0));
+        let color = folder.path().join("rock color.png");
+        assert_eq!(rock.base_color_texture, Some(FileTexture::Path(color)));
+        let map = rock.displacement.as_ref().unwrap();
+        assert_eq!(map.path, folder.path().join("rock height.png"));
+        assert_eq!((map.scale, map.midlevel), (Some(2.0), Some(0.5)));
+        let moss = file.parts[1].material.as_ref().unwrap();
+        let map = moss.displacement.as_ref().unwrap();
+        assert_eq!(map.path, folder.path().join("moss.png"));
+        assert_eq!(map.scale, Some(0.5));
+        assert!(file.parts[2].material.is_none());
+    }
+}

@@ -1,0 +1,40 @@
+//! From a scene to the world that a backend is built from.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::{ObjectShape, Scene, SceneObject};
+use crate::prism::{MarchError, Prisms};
+use crate::trace::{Object, Placement, Shape, World};
+
+impl Scene {
+    /// The world of this scene; object k of the world is object k of the scene. Builds the prisms, in parallel.
+    ///
+    /// # Errors
+    ///
+    /// A march whose step is no positive number; what is loaded from a file never has one.
+    pub fn world(&self) -> Result<World, MarchError> {
+        let objects: Result<_, _> = self.objects.par_iter().map(SceneObject::traced).collect();
+        objects.map(World::new)
+    }
+}
+
+impl SceneObject {
+    fn traced(&self) -> Result<Object, MarchError> {
+        let shape = match &self.shape {
+            ObjectShape::Displaced(surface, march) => {
+                Shape::Displaced(Arc::new(Prisms::new(surface.clone(), *march)?))
+            }
+            ObjectShape::Plain(mesh) => Shape::Triangles(mesh.clone()),
+        };
+        Ok(Object {
+            shape,
+            placement: match &self.instances[..] {
+                [] => Placement::World,
+                instances => Placement::Instances(instances.to_vec()),
+            },
+            mask: self.mask,
+        })
+    }
+}

@@ -1,0 +1,184 @@
+//! One base triangle's piece of the displaced surface, in f64: the definition that every fast path is held to.
+
+use glam::{DVec2, DVec3};
+
+use super::DisplacementMap;
+
+/// S(b) over one base triangle, and its derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch<'m> {
+    /// v_i, world units.
+    pub vertices: [DVec3; 3],
+    /// n_i, unit.
+    pub normals: [DVec3; 3],
+    /// st_i after the UV transform, in texel coordinates, moved by whole periods of the map towards 0.
+    pub texels: [DVec2; 3],
+    /// The heights.
+    pub map: &'m DisplacementMap,
+    /// World units per unit of height.
+    pub scale: f64,
+    /// The height that displaces by nothing.
+    pub midlevel: f64,
+}
+
+/// A point of S with its tangents.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatchPoint {
+    /// S(b).
+    pub position: DVec3,
+    /// dS/du (u = b1).
+    pub du: DVec3,
+    /// dS/dv (v = b2).
+    pub dv: DVec3,
+    /// D.
+    pub displacement: f64,
+}
+
+impl Patch<'_> {
+    /// P(b) = sum b_i v_i.
+    pub fn base(&self, u: f64, v: f64) -> DVec3 {
+        weighted(&self.vertices, u, v)
+    }
+
+    /// N'(b) = sum b_i n_i, not normalised.
+    pub fn normal(&self, u: f64, v: f64) -> DVec3 {
+        weighted(&self.normals, u, v)
+    }
+
+    /// Texel coordinates at b.
+    pub fn texel(&self, u: f64, v: f64) -> DVec2 {
+        let t = &self.texels;
+        t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0])
+    }
+
+    /// D at b.
+    pub fn displacement(&self, u: f64, v: f64) -> f64 {
+        self.scale * (self.map.sample(self.texel(u, v)).height - self.midlevel)
+    }
+
+    /// Unit normal of the flat base triangle, counter-clockwise outward.
+    pub fn face_normal(&self) -> DVec3 {
+        let [a, b, c] = self.vertices;
+        (b - a).cross(c - a).normalize()
+    }
+
+    /// |N'(b)| at its smallest over the triangle, from below: |N'|^2 = 1 - sum b_i b_j |n_i - n_j|^2 and the sum
+    /// of the b_i b_j is at most 1/3. Never less than [`Self::LEAST_NORMAL`].
+    pub fn shortest_normal(&self) -> f64 {
+        let [a, b, c] = self.normals;
+        let spread = a
+            .distance_squared(b)
+            .max(b.distance_squared(c))
+            .max(c.distance_squared(a));
+        (1.0 - spread / 3.0)
+            .max(Self::LEAST_NORMAL * Self::LEAST_NORMAL)
+            .sqrt()
+    }
+
+    /// The range of w = D / |N'| for D in `range`.
+    pub fn offsets(&self, [low, high]: [f64; 2]) -> [f64; 2] {
+        let shortest = self.shortest_normal();
+        [low.min(low / shortest), high.max(high / shortest)]
+    }
+
+    /// Where opposed normals cancel to less than this, the surface is cut off.
+    pub const LEAST_NORMAL: f64 = 1e-3;
+
+    /// The exact inverse of P(b) + w N'(b) = x near a guess, by Newton's method: (u, v, w), or `None` where it does
+    /// not converge.
+    pub fn project(&self, x: DVec3, mut u: f64, mut v: f64) -> Option<DVec3> {
+        let face = self.face_normal();
+        let mut w = (x - self.base(u, v)).dot(face) / self.normal(u, v).dot(face);
+        for _ in 0..16 {
+            let normal = self.normal(u, v);
+            let du = self.vertices[1] - self.vertices[0] + w * (self.normals[1] - self.normals[0]);
+            let dv = self.vertices[2] - self.vertices[0] + w * (self.normals[2] - self.normals[0]);
+            let step = solve([du, dv, normal], x - self.base(u, v) - w * normal)?;
+            (u, v, w) = (u + step.x, v + step.y, w + step.z);
+            if step.x.abs().max(step.y.abs()) < 1e-12 {
+                return Some(DVec3::new(u, v, w));
+            }
+        }
+        None
+    }
+
+    /// S, dS/du and dS/dv at b:
+    /// dS = dP + dD N + D (dN' - N (N . dN')) / |N'| with N = N'/|N'|.
+    pub fn point(&self, u: f64, v: f64) -> PatchPoint {
+        let sample = self.map.sample(self.texel(u, v));
+        let displacement = self.scale * (sample.height - self.midlevel);
+        let raw_normal = self.normal(u, v);
+        let inverse_length = raw_normal.length_recip();
+        let normal = raw_normal * inverse_length;
+        let tangent = |i: usize| {
+            let dd = self.scale * sample.gradient.dot(self.texels[i] - self.texels[0]);
+            let dn = self.normals[i] - self.normals[0];
+            self.vertices[i] - self.vertices[0]
+                + dd * normal
+                + displacement * inverse_length * (dn - normal * normal.dot(dn))
+        };
+        PatchPoint {
+            position: self.base(u, v) + displacement * normal,
+            du: tangent(1),
+            dv: tangent(2),
+            displacement,
+        }
+    }
+}
+
+/// The solution of [a b c] x = r by Cramer's rule; `None` for a singular or non-finite system.
+pub(crate) fn solve([a, b, c]: [DVec3; 3], r: DVec3) -> Option<DVec3> {
+    let bc = b.cross(c);
+    let x = DVec3::new(r.dot(bc), a.dot(r.cross(c)), a.dot(b.cross(r))) / a.dot(bc);
+    x.is_finite().then_some(x)
+}
+
+fn weighted(x: &[DVec3; 3], u: f64, v: f64) -> DVec3 {
+    x[0] + u * (x[1] - x[0]) + v * (x[2] - x[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::{Texels, Wrap};
+
+    #[test]
+    fn tangents_are_difference_quotients() {
+        let map = DisplacementMap::new(
+            3,
+            3,
+            Texels::U8(vec![0, 50, 9, 200, 255, 3, 70, 80, 90]),
+            Wrap::Repeat,
+        );
+        let map = map.unwrap();
+        let patch = Patch {
+            vertices: [
+                DVec3::ZERO,
+                DVec3::new(1.0, 0.1, 0.0),
+                DVec3::new(0.2, 1.0, 0.3),
+            ],
+            normals: [
+                DVec3::Z,
+                DVec3::new(0.6, 0.0, 0.8),
+                DVec3::new(0.0, -0.28, 0.96),
+            ],
+            texels: [
+                DVec2::new(0.2, 0.3),
+                DVec2::new(0.9, 0.4),
+                DVec2::new(0.3, 0.95),
+            ],
+            map: &map,
+            scale: 0.7,
+            midlevel: 0.25,
+        };
+        let (u, v, e) = (0.3, 0.4, 1e-6);
+        let p = patch.point(u, v);
+        let du = (patch.point(u + e, v).position - patch.point(u - e, v).position) / (2.0 * e);
+        let dv = (patch.point(u, v + e).position - patch.point(u, v - e).position) / (2.0 * e);
+        assert!((p.du - du).length() < 1e-8 && (p.dv - dv).length() < 1e-8);
+        assert!((p.displacement - patch.displacement(u, v)).abs() < 1e-15);
+        let x = patch.base(u, v) + 0.3 * patch.normal(u, v);
+        let found = patch.project(x, 0.1, 0.1).unwrap();
+        assert!((found - DVec3::new(u, v, 0.3)).length() < 1e-10);
+    }
+}
