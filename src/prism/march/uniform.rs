@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::Step;
 use super::polish::Crossing;
-use crate::prism::path::{HeightField, Path};
+use crate::prism::path::{HeightUnits, Path};
 use crate::prism::simd::{Grid, LANES, Lanes};
 
 /// No march takes more steps in one prism than this, however small the step.
@@ -20,7 +20,7 @@ pub struct Field<'a> {
     /// The ray's path.
     pub path: &'a Path,
     /// Units of height.
-    pub heights: &'a HeightField,
+    pub heights: &'a HeightUnits,
     /// The map.
     pub grid: &'a Grid<'a>,
     /// |n_i - n_j|^2, see [`Path::above`].
