@@ -360,19 +360,12 @@ fn gilding(st: Vec2, cavity: &Cavity) -> Vec3 {
     let uneven = fbm3(21, 7.0 * p, Octaves::new(4));
     let relief = cavity.relief(st) + 0.03 * uneven;
     let height = cavity.height(st);
-    let shade = mix(
-        0.85,
-        1.15,
-        smoothstep(-0.4, 0.5, fbm3(22, 30.0 * p, Octaves::new(3))),
-    );
+    let shade = mix(0.85, 1.15, smoothstep(-0.4, 0.5, fbm3(22, 30.0 * p, Octaves::new(3))));
     let mut color = gold * shade;
     let hollow = smoothstep(0.02, -0.14, relief).max(smoothstep(0.3, 0.14, height));
     color = color.lerp(dark, 0.85 * hollow);
     color = color.lerp(patina, 0.75 * hollow * smoothstep(-0.1, 0.35, uneven));
-    color.lerp(
-        bole,
-        0.7 * smoothstep(0.33, 0.5, uneven) * smoothstep(0.0, 0.08, relief),
-    )
+    color.lerp(bole, 0.7 * smoothstep(0.33, 0.5, uneven) * smoothstep(0.0, 0.08, relief))
 }
 
 fn scene(scale: f32, midlevel: f32) -> String {

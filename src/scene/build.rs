@@ -241,7 +241,7 @@ impl Builder {
             }
         };
         let Some(scale) = table.scale.or(by_file.and_then(|f| f.scale)) else {
-            return Err(table.this.refuse("no scale", SCALE));
+            return Err(table.this.refuse("no scale", format!("scale = {SCALE}")));
         };
         let channel = match (&table.channel, by_file.and_then(|f| f.channel)) {
             (Some(channel), _) => channel.clone(),

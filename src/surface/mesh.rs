@@ -380,6 +380,12 @@ impl BaseMesh {
         &self.triangles
     }
 
+    /// The first corner of one triangle.
+    #[inline]
+    pub fn first_corner(&self, triangle: u32) -> Vec3 {
+        self.positions[self.triangles[triangle as usize][0] as usize]
+    }
+
     /// The corners of one triangle.
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize])

@@ -11,7 +11,7 @@ use crate::surface::{UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
 pub(in crate::scene) const SCALE: &str =
-    "scale, world units from height 0 to height 1: a number other than 0";
+    "world units from height 0 to height 1: a number other than 0";
 
 /// One mesh as written.
 #[derive(Debug)]

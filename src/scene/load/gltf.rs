@@ -14,12 +14,16 @@ use glam::{Affine3A, Mat4, Vec2, Vec3};
 use super::{FileMaterial, FileTexture, LoadMeshErrorKind, LoadedFile, Parts, beside};
 use crate::surface::MeshBuilder;
 
+/// Required extensions that may be ignored: without them a texture or a light is lost, but no shape.
+const HARMLESS_EXTENSIONS: [&str; 2] = ["KHR_lights_punctual", "KHR_texture_transform"];
+
 /// Reads the bytes of the file at `path`.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     check_glb_header(bytes)?;
-    let gltf = Gltf::from_slice(bytes).map_err(|e| malformed("glTF document", e.to_string()))?;
-    let buffers = read_buffers(&gltf, path)?;
-    let Gltf { document, .. } = gltf;
+    let Gltf { document, blob } =
+        Gltf::from_slice_without_validation(bytes).map_err(|e| bad_document(&e))?;
+    let document = validated(document)?;
+    let buffers = read_buffers(&document, blob, path)?;
     let scene = document
         .default_scene()
         .or_else(|| document.scenes().next())
@@ -68,6 +72,24 @@ fn malformed(what: &str, problem: impl Into<String>) -> LoadMeshErrorKind {
     }
 }
 
+fn bad_document(error: &crate_gltf::Error) -> LoadMeshErrorKind {
+    malformed("glTF document", error.to_string())
+}
+
+/// Checked by the crate, after extensions that leave the shape alone are struck off the required ones.
+fn validated(document: Document) -> Result<Document, LoadMeshErrorKind> {
+    let mut root = document.into_json();
+    root.extensions_required.retain(|name| {
+        !name.starts_with("KHR_materials_") && !HARMLESS_EXTENSIONS.contains(&name.as_str())
+    });
+    if let Some(name) = root.extensions_required.first() {
+        return Err(LoadMeshErrorKind::Unsupported {
+            what: format!("the glTF extension {name}, which the file requires,"),
+        });
+    }
+    Document::from_json(root).map_err(|e| bad_document(&e))
+}
+
 /// The crate trusts the length in the header not to be less than the header itself.
 fn check_glb_header(bytes: &[u8]) -> Result<(), LoadMeshErrorKind> {
     if !bytes.starts_with(b"glTF") {
@@ -91,24 +113,25 @@ fn check_glb_header(bytes: &[u8]) -> Result<(), LoadMeshErrorKind> {
 }
 
 /// The bytes of every buffer, each at least as long as the document says.
-fn read_buffers(gltf: &Gltf, path: &Path) -> Result<Vec<Vec<u8>>, LoadMeshErrorKind> {
-    gltf.buffers()
+fn read_buffers(
+    document: &Document,
+    mut blob: Option<Vec<u8>>,
+    path: &Path,
+) -> Result<Vec<Vec<u8>>, LoadMeshErrorKind> {
+    document
+        .buffers()
         .map(|buffer| {
             let what = format!("buffer {}", buffer.index());
             let data = match buffer.source() {
-                crate_gltf::buffer::Source::Bin => gltf
-                    .blob
-                    .clone()
-                    .ok_or_else(|| malformed(&what, "the GLB has no binary chunk"))?,
+                crate_gltf::buffer::Source::Bin => blob
+                    .take()
+                    .ok_or_else(|| malformed(&what, "the file has no binary chunk left for it"))?,
                 crate_gltf::buffer::Source::Uri(uri) => read_uri(uri, path, &what)?,
             };
             if data.len() < buffer.length() {
-                let found = data.len();
-                let wanted = buffer.length();
-                return Err(malformed(
-                    &what,
-                    format!("{found} bytes found, {wanted} expected"),
-                ));
+                let (found, wanted) = (data.len(), buffer.length());
+                let problem = format!("{found} bytes found, {wanted} expected");
+                return Err(malformed(&what, problem));
             }
             Ok(data)
         })
@@ -123,7 +146,7 @@ fn read_uri(uri: &str, path: &Path, what: &str) -> Result<Vec<u8>, LoadMeshError
             .ok_or_else(|| malformed(what, "its data URI is not valid base64"));
     }
     let file = beside(path, &percent_decoded(uri));
-    std::fs::read(&file).map_err(|source| LoadMeshErrorKind::Read {
+    super::read_regular(&file).map_err(|source| LoadMeshErrorKind::Read {
         what: format!("{what}, {}", file.display()),
         source,
     })
@@ -552,6 +575,19 @@ mod tests {
         let error = load(&with("/nodes/0/children", json!([0]))).unwrap_err();
         assert!(error.to_string().contains("node 0"), "{error}");
         assert!(load(&with("/scenes/0/nodes", json!([0, 1]))).is_err());
+    }
+
+    #[test]
+    fn a_required_extension_is_refused_unless_it_leaves_the_shape_alone() {
+        let mut document = document();
+        document["extensionsRequired"] = json!(["KHR_materials_unlit"]);
+        assert!(load(&document).is_ok());
+        document["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+        let error = load(&document).unwrap_err();
+        assert!(
+            error.to_string().contains("KHR_draco_mesh_compression"),
+            "{error}"
+        );
     }
 
     #[test]

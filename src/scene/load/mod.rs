@@ -27,8 +27,7 @@ pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
 pub struct LoadMeshError {
     /// The file that was asked for.
     pub path: PathBuf,
-    /// What is wrong with it.
-    #[source]
+    /// What is wrong with it; part of the message.
     pub kind: LoadMeshErrorKind,
 }
 
@@ -196,7 +195,7 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     if !MESH_EXTENSIONS.contains(&extension.as_str()) {
         return Err(LoadMeshErrorKind::UnknownExtension { found: extension });
     }
-    let bytes = std::fs::read(path).map_err(|source| LoadMeshErrorKind::Read {
+    let bytes = read_regular(path).map_err(|source| LoadMeshErrorKind::Read {
         what: "the file".into(),
         source,
     })?;
@@ -216,6 +215,14 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
         part.name = stem.clone().into_owned();
     }
     Ok(file)
+}
+
+/// The bytes of a regular file: a mesh file that names a device must not make us read for ever.
+fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("not a regular file"));
+    }
+    std::fs::read(path)
 }
 
 /// Sorts meshes into parts by material and by whether they have texture coordinates.
@@ -301,6 +308,11 @@ mod tests {
     fn missing_and_empty_files_are_refused() {
         let missing = load_mesh(Path::new("no/such/mesh.obj")).unwrap_err();
         assert!(matches!(missing.kind, LoadMeshErrorKind::Read { .. }));
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("mesh.obj");
+        std::fs::create_dir(&folder).unwrap();
+        let refused = load_mesh(&folder).unwrap_err();
+        assert!(matches!(refused.kind, LoadMeshErrorKind::Read { .. }));
         for known in MESH_EXTENSIONS {
             let empty = load_bytes(&format!("mesh.{known}"), b"").unwrap_err();
             assert!(matches!(empty.kind, LoadMeshErrorKind::Empty));
