@@ -7,6 +7,7 @@ mod chainmail;
 mod drape;
 #[cfg(test)]
 mod laws;
+mod leather;
 mod noise;
 mod paint;
 mod scatter;
@@ -48,7 +49,7 @@ pub struct Demo {
 }
 
 /// The demos, in the order of `--list`.
-pub const DEMOS: &[Demo] = &[asteroid::DEMO, chainmail::DEMO];
+pub const DEMOS: &[Demo] = &[asteroid::DEMO, chainmail::DEMO, leather::DEMO];
 
 /// The demo of that name.
 pub fn find(name: &str) -> Option<&'static Demo> {
