@@ -77,7 +77,11 @@ fn main() {
 
     let displaced = Shape::Displaced(Arc::new(prisms(&base, &map, 1.0)));
     let mut cases = [
-        case(format!("{} prisms", base.triangles().len()), displaced, size),
+        case(
+            format!("{} prisms", base.triangles().len()),
+            displaced,
+            size,
+        ),
         case(
             format!("{} triangles", fine.triangles().len()),
             Shape::Triangles(fine),

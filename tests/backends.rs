@@ -15,7 +15,7 @@ use std::sync::Arc;
 use common::scene::{prisms, random, rock_map, sphere};
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use prismarch::bvh::{BvhError, BvhTracer};
-use prismarch::prism::{PrismHit, Prisms};
+use prismarch::prism::PrismHit;
 use prismarch::ray::Ray;
 use prismarch::surface::BaseMesh;
 use prismarch::trace::{Hit, INVALID_ID, Object, Placement, Shape, Tracer, World};
@@ -73,7 +73,11 @@ impl Random {
 }
 
 fn displaced(subdivisions: u32) -> Shape {
-    Shape::Displaced(Arc::new(prisms(&sphere(subdivisions), &rock_map(64, 7), 1.0)))
+    Shape::Displaced(Arc::new(prisms(
+        &sphere(subdivisions),
+        &rock_map(64, 7),
+        1.0,
+    )))
 }
 
 fn in_world(shape: Shape, mask: u32) -> Object {
@@ -178,7 +182,10 @@ fn assert_close(ray: &Ray, a: &Hit, b: &Hit) {
     if (a.prim, a.geom, a.inst) == (b.prim, b.geom, b.inst) {
         let normals_agree = a.ng.dot(b.ng) > 0.99;
         assert!(normals_agree, "{ray:?}\n{a:?}\n{b:?}");
-        assert!((a.u - b.u).abs() < 0.02 && (a.v - b.v).abs() < 0.02, "{ray:?}\n{a:?}\n{b:?}");
+        assert!(
+            (a.u - b.u).abs() < 0.02 && (a.v - b.v).abs() < 0.02,
+            "{ray:?}\n{a:?}\n{b:?}"
+        );
     }
     assert!((a.ng.length() - 1.0).abs() < 1e-5);
 }
@@ -202,8 +209,16 @@ fn compare_closely(rays: &[Ray], a: &dyn Fn(&Ray) -> Option<Hit>, b: &dyn Fn(&Ra
             _ => grazes += 1,
         }
     }
-    assert!(hits * 5 > rays.len(), "only {hits} of {} rays hit", rays.len());
-    assert!(grazes * 1000 <= rays.len(), "{grazes} of {} rays", rays.len());
+    assert!(
+        hits * 5 > rays.len(),
+        "only {hits} of {} rays hit",
+        rays.len()
+    );
+    assert!(
+        grazes * 1000 <= rays.len(),
+        "{grazes} of {} rays",
+        rays.len()
+    );
 }
 
 fn rays(count: usize, seed: u32) -> Vec<Ray> {
@@ -233,7 +248,11 @@ fn triangles_under_obvhs_are_those_of_a_loop() {
     let rays = rays(6000, 4);
     compare_closely(&rays, &|r| tracer.intersect(r), &|r| by_loop(&world, r));
     for ray in &rays {
-        assert_eq!(tracer.occluded(ray), tracer.intersect(ray).is_some(), "{ray:?}");
+        assert_eq!(
+            tracer.occluded(ray),
+            tracer.intersect(ray).is_some(),
+            "{ray:?}"
+        );
     }
 }
 
@@ -246,8 +265,15 @@ fn a_tie_goes_to_the_lower_ids() {
     };
     let ray = Ray::new(Vec3::new(0.1, 0.2, 5.0), -Vec3::Z);
     for objects in [vec![twice(), here.clone()], vec![here, twice()]] {
-        let hit = BvhTracer::new(&World::new(objects)).unwrap().intersect(&ray).unwrap();
-        let top = if hit.inst[0] == INVALID_ID { hit.geom } else { hit.inst[0] };
+        let hit = BvhTracer::new(&World::new(objects))
+            .unwrap()
+            .intersect(&ray)
+            .unwrap();
+        let top = if hit.inst[0] == INVALID_ID {
+            hit.geom
+        } else {
+            hit.inst[0]
+        };
         assert_eq!(top, 0);
     }
 }
@@ -278,7 +304,10 @@ fn a_refit_refuses_another_world_and_changes_nothing() {
     ];
     for other in &others {
         let refused = tracer.refit(other);
-        assert!(matches!(refused, Err(BvhError::Changed { .. })), "{refused:?}");
+        assert!(
+            matches!(refused, Err(BvhError::Changed { .. })),
+            "{refused:?}"
+        );
         assert_eq!(tracer.bounds(), bounds);
     }
 }
@@ -288,7 +317,8 @@ fn nothing_and_nonsense_hit_nothing() {
     let empty = BvhTracer::new(&World::default()).unwrap();
     let ray = Ray::new(Vec3::ZERO, Vec3::X);
     assert!(empty.intersect(&ray).is_none() && !empty.occluded(&ray));
-    let tracer = BvhTracer::new(&World::new(vec![in_world(Shape::Triangles(sphere(0)), 1)])).unwrap();
+    let tracer =
+        BvhTracer::new(&World::new(vec![in_world(Shape::Triangles(sphere(0)), 1)])).unwrap();
     for direction in [Vec3::ZERO, Vec3::NAN, Vec3::INFINITY] {
         let ray = Ray::new(Vec3::ZERO, direction);
         assert!(tracer.intersect(&ray).is_none() && !tracer.occluded(&ray));
@@ -308,12 +338,24 @@ fn a_transform_without_an_inverse_is_refused() {
         mask: 1,
     };
     let refused = BvhTracer::new(&World::new(vec![flat])).err().unwrap();
-    assert!(matches!(refused, BvhError::BadTransform { object: 0, instance: 1, .. }), "{refused}");
+    assert!(
+        matches!(
+            refused,
+            BvhError::BadTransform {
+                object: 0,
+                instance: 1,
+                ..
+            }
+        ),
+        "{refused}"
+    );
 }
 
 #[cfg(feature = "embree")]
 mod embree {
+    use prismarch::demo::{DEMOS, Demo};
     use prismarch::embree::{EmbreeOptions, EmbreeTracer};
+    use prismarch::scene::{Camera, Loaded};
 
     use super::*;
 
@@ -331,7 +373,11 @@ mod embree {
         let mut ties = 0;
         for ray in rays(20_000, 11) {
             let (a, b) = (bvh.intersect(&ray), embree.intersect(&ray));
-            assert_eq!(a.map(|hit| hit.t.to_bits()), b.map(|hit| hit.t.to_bits()), "{ray:?}");
+            assert_eq!(
+                a.map(|hit| hit.t.to_bits()),
+                b.map(|hit| hit.t.to_bits()),
+                "{ray:?}"
+            );
             assert_eq!(embree.occluded(&ray), b.is_some(), "{ray:?}");
             if let (Some(a), Some(b)) = (a, b) {
                 let ids = |hit: &Hit| (hit.geom, hit.prim);
@@ -356,7 +402,68 @@ mod embree {
         ] {
             let world = world(shapes, seed);
             let (bvh, embree) = both(&world);
-            compare_closely(&rays(10_000, seed), &|r| bvh.intersect(r), &|r| embree.intersect(r));
+            compare_closely(&rays(10_000, seed), &|r| bvh.intersect(r), &|r| {
+                embree.intersect(r)
+            });
         }
+    }
+
+    /// Every demo's camera rays, and from every hit a ray to the sky.
+    #[test]
+    fn demos_look_the_same() {
+        for demo in DEMOS {
+            let folder = tempfile::tempdir().unwrap();
+            let small = Demo {
+                map_size: 512,
+                ..*demo
+            };
+            let scene = Loaded::from_file(&small.write(folder.path()).unwrap())
+                .unwrap()
+                .scene;
+            let world = scene.world().unwrap();
+            let (bvh, embree) = both(&world);
+            let camera = camera_rays(&scene.camera, 160, 120);
+            let to_sky: Vec<Ray> = camera
+                .iter()
+                .filter_map(|ray| {
+                    let hit = bvh.intersect(ray)?;
+                    let up = Vec3::new(0.3, 0.9, 0.2) * ray.direction.length();
+                    Some(Ray {
+                        tnear: 1e-3,
+                        ..Ray::new(ray.at(hit.t), up)
+                    })
+                })
+                .collect();
+            for ray in camera.iter().chain(&to_sky) {
+                let (a, b) = (bvh.intersect(ray), embree.intersect(ray));
+                if let (Some(a), Some(b)) = (a, b)
+                    && (a.prim, a.geom, a.inst) == (b.prim, b.geom, b.inst)
+                    && a.inst[0] == INVALID_ID
+                    && is_displaced(&world, &a)
+                {
+                    assert_eq!(a, b, "{}: {ray:?}", demo.name);
+                }
+            }
+            compare_closely(&camera, &|r| bvh.intersect(r), &|r| embree.intersect(r));
+        }
+    }
+
+    fn is_displaced(world: &World, hit: &Hit) -> bool {
+        let object = &world.objects()[world.resolve(hit).object];
+        matches!(object.shape, Shape::Displaced(_))
+    }
+
+    fn camera_rays(camera: &Camera, width: u32, height: u32) -> Vec<Ray> {
+        let forward = (camera.target - camera.position).normalize();
+        let right = forward.cross(camera.up).normalize();
+        let down = forward.cross(right);
+        let pixel = 2.0 * (0.5 * camera.fov).tan() / height as f32;
+        let on_film = |i: u32, count: u32| (i as f32 + 0.5 - 0.5 * count as f32) * pixel;
+        (0..width * height)
+            .map(|i| {
+                let (x, y) = (on_film(i % width, width), on_film(i / width, height));
+                Ray::new(camera.position, forward + x * right + y * down)
+            })
+            .collect()
     }
 }

@@ -39,7 +39,8 @@ fn icosahedron() -> Vec<[Vec3; 3]> {
     let mut corners = Vec::new();
     for a in [-1.0, 1.0] {
         for b in [-golden, golden] {
-            corners.extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]].map(|p| Vec3::from(p).normalize()));
+            corners
+                .extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]].map(|p| Vec3::from(p).normalize()));
         }
     }
     let edge = 2.0 / (1.0 + golden * golden).sqrt();
@@ -71,7 +72,11 @@ fn texcoords(face: [Vec3; 3]) -> [Vec2; 3] {
     face.map(|p| {
         let offset = longitude(p) - reference;
         // At a pole any longitude is right: the one of the face's middle distorts least.
-        let offset = if is_pole(p) { 0.0 } else { offset - offset.round() };
+        let offset = if is_pole(p) {
+            0.0
+        } else {
+            offset - offset.round()
+        };
         Vec2::new(reference + offset, p.z.clamp(-1.0, 1.0).asin() / PI + 0.5)
     })
 }

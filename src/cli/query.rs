@@ -215,7 +215,8 @@ impl Query<'_> {
     fn run(&self, rays: &mut RayReader, out: &mut impl Write) -> Result<(), Stop> {
         let mut rows = vec![ByteRecord::new(); CHUNK];
         let mut first = 0;
-        out.write_all(hits::HEADER.as_bytes()).map_err(Stop::Write)?;
+        out.write_all(hits::HEADER.as_bytes())
+            .map_err(Stop::Write)?;
         loop {
             let count = rays.read(&mut rows).map_err(|e| Stop::Because(e.into()))?;
             let tables = self

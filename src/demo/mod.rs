@@ -3,15 +3,20 @@
 //! Everything is procedural and seeded, so that the repository stays small and every run makes the same bytes.
 
 mod asteroid;
+mod cavity;
 mod chainmail;
+mod dragon;
 mod drape;
 #[cfg(test)]
 mod laws;
 mod leather;
 mod noise;
+mod orb;
 mod paint;
 mod scatter;
 mod shape;
+mod stump;
+mod sweep;
 mod write;
 
 use crate::surface::MeshBuilder;
@@ -49,7 +54,14 @@ pub struct Demo {
 }
 
 /// The demos, in the order of `--list`.
-pub const DEMOS: &[Demo] = &[asteroid::DEMO, chainmail::DEMO, leather::DEMO];
+pub const DEMOS: &[Demo] = &[
+    asteroid::DEMO,
+    chainmail::DEMO,
+    leather::DEMO,
+    orb::DEMO,
+    stump::DEMO,
+    dragon::DEMO,
+];
 
 /// The demo of that name.
 pub fn find(name: &str) -> Option<&'static Demo> {

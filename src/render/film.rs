@@ -110,7 +110,9 @@ impl TileGrid {
         let start = UVec2::new(column, row) * self.tile;
         Tile {
             start,
-            end: start.saturating_add(UVec2::splat(self.tile)).min(self.picture),
+            end: start
+                .saturating_add(UVec2::splat(self.tile))
+                .min(self.picture),
         }
     }
 

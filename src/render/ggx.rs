@@ -85,7 +85,10 @@ mod tests {
                 }
             }
             let solid_angle = sum / n as f32;
-            assert!((solid_angle / PI - 1.0).abs() < 0.03, "{alpha} {solid_angle}");
+            assert!(
+                (solid_angle / PI - 1.0).abs() < 0.03,
+                "{alpha} {solid_angle}"
+            );
         }
     }
 }

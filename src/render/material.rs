@@ -158,9 +158,7 @@ mod tests {
     }
 
     fn points(n: usize) -> impl Iterator<Item = Vec2> {
-        (0..n).map(move |i| {
-            Vec2::new((i as f32 * 0.618_034).fract(), (i as f32 + 0.5) / n as f32)
-        })
+        (0..n).map(move |i| Vec2::new((i as f32 * 0.618_034).fract(), (i as f32 + 0.5) / n as f32))
     }
 
     #[test]
@@ -197,7 +195,10 @@ mod tests {
                     diffuse += bsdf.evaluate(v, l).diffuse / (l.z * FRAC_1_PI);
                 }
                 let albedo = (specular + diffuse) / n as f32;
-                assert!(albedo.max_element() <= 1.001, "{metallic} {roughness} {theta} {albedo}");
+                assert!(
+                    albedo.max_element() <= 1.001,
+                    "{metallic} {roughness} {theta} {albedo}"
+                );
             }
         }
     }

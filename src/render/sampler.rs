@@ -149,8 +149,8 @@ mod tests {
                 let (columns, rows) = (1 << log_columns, 64 >> log_columns);
                 let mut seen = [false; 64];
                 for p in &points {
-                    let cell = (p.x * columns as f32) as usize
-                        + columns * (p.y * rows as f32) as usize;
+                    let cell =
+                        (p.x * columns as f32) as usize + columns * (p.y * rows as f32) as usize;
                     assert!(!seen[cell], "two samples in a {columns}x{rows} cell");
                     seen[cell] = true;
                 }

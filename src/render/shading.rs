@@ -165,7 +165,8 @@ mod tests {
             }
             for tilt in [-1.5, -0.8, -0.3, 0.0, 0.3, 0.8, 1.5_f32] {
                 for turn in [0.0_f32, 0.9] {
-                    let shading = Vec3::new(tilt.sin() * turn.cos(), tilt.cos(), tilt.sin() * turn.sin());
+                    let shading =
+                        Vec3::new(tilt.sin() * turn.cos(), tilt.cos(), tilt.sin() * turn.sin());
                     let n = facing(shading, Vec3::Y, v);
                     assert!((n.length() - 1.0).abs() < 1e-4);
                     assert!(n.dot(v) > 0.0 && n.y > 0.0);

@@ -14,16 +14,16 @@ use glam::{Affine3A, Vec3};
 
 use super::error::{AssetError, SceneError};
 use super::file::{
-    BaseColorTable, DisplacementTable, Keyed, LightTable, MaterialTable, MeshTable, SceneFile,
-    SCALE, default_sun,
+    BaseColorTable, DisplacementTable, Keyed, LightTable, MaterialTable, MeshTable, SCALE,
+    SceneFile, default_sun,
 };
 use super::load::{FileDisplacement, FileMaterial, FileTexture, load_mesh};
 use super::{Camera, Color, Film, Light, Material, ObjectShape, Scene, SceneObject, Texture};
 use crate::image::{Channel, ColorSpace};
 use crate::prism::March;
 use crate::surface::{
-    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, UvTransform,
-    Wrap,
+    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode,
+    UvTransform, Wrap,
 };
 use assets::Assets;
 
@@ -214,7 +214,10 @@ impl Builder {
             })?;
         if report.degenerate_dropped > 0 {
             let dropped = report.degenerate_dropped;
-            self.warn(path, format!("{name}: {dropped} faces without area were left out"));
+            self.warn(
+                path,
+                format!("{name}: {dropped} faces without area were left out"),
+            );
         }
         Ok(Arc::new(mesh))
     }
@@ -238,7 +241,7 @@ impl Builder {
             }
         };
         let Some(scale) = table.scale.or(by_file.and_then(|f| f.scale)) else {
-            return Err(table.this.refuse("no scale", SCALE));
+            return Err(table.this.refuse("no scale", format!("scale = {SCALE}")));
         };
         let channel = match (&table.channel, by_file.and_then(|f| f.channel)) {
             (Some(channel), _) => channel.clone(),
@@ -282,9 +285,11 @@ impl Builder {
     /// Adds a material that a mesh file gives.
     fn file_material(&mut self, path: &Path, file: FileMaterial) -> Result<usize, AssetError> {
         let image = match &file.base_color_texture {
-            Some(FileTexture::Path(picture)) => {
-                Some(self.assets.color(picture, ColorSpace::Srgb, file.base_color)?)
-            }
+            Some(FileTexture::Path(picture)) => Some(self.assets.color(
+                picture,
+                ColorSpace::Srgb,
+                file.base_color,
+            )?),
             Some(FileTexture::Embedded(bytes)) => {
                 Some(assets::embedded_color(path, bytes, file.base_color)?)
             }

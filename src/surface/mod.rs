@@ -11,6 +11,7 @@
 //! This room knows no prism, no Embree, no picture and no thread pool.
 
 mod displaced;
+mod footprint;
 mod map;
 mod mesh;
 mod normals;

@@ -133,19 +133,18 @@ fn cluster_normals(
     let roots: Vec<usize> = (0..sums.len())
         .map(|corner| clusters.root(corner))
         .collect();
-    roots
-        .iter()
-        .enumerate()
-        .map(|(corner, &root)| {
-            let (sum, weights) = sums[root];
-            if sum.length() > CANCELLED * weights {
-                unit(sum)
-            } else {
-                clusters.parent[corner] = corner;
-                unit(faces[corner / 3])
-            }
-        })
-        .collect()
+    let mut normals = Vec::with_capacity(roots.len());
+    for (corner, &root) in roots.iter().enumerate() {
+        let (sum, weights) = sums[root];
+        if sum.length() > CANCELLED * weights {
+            normals.push(unit(sum));
+        } else {
+            // Every corner of the cluster comes here, so none is left pointing at another.
+            clusters.parent[corner] = corner;
+            normals.push(unit(faces[corner / 3]));
+        }
+    }
+    normals
 }
 
 /// Gives each (vertex, cluster) pair a vertex of its own; the first cluster keeps the old index.
@@ -202,5 +201,109 @@ impl Clusters {
     fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b)] = a.min(b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec3;
+    use std::f32::consts::{FRAC_PI_2, PI};
+
+    /// Corners by the bits of their index (x, y, z), centred; two triangles a side, wound outward.
+    fn cube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let coordinate = |i: u32, bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        let positions = (0..8)
+            .map(|i| vec3(coordinate(i, 0), coordinate(i, 1), coordinate(i, 2)))
+            .collect();
+        let sides = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let triangles = sides
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect();
+        (positions, triangles)
+    }
+
+    #[test]
+    fn cube_corners_point_along_the_diagonals() {
+        let (positions, triangles) = cube();
+        let smooth = smooth(&positions, &triangles, PI);
+        assert!(smooth.copies.is_empty());
+        for (n, p) in smooth.normals.iter().zip(&positions) {
+            // Exact: an unweighted average would lean to the side with two triangles at the corner.
+            assert_eq!(*n, *p * (1.0 / 3.0_f64.sqrt()) as f32);
+        }
+    }
+
+    #[test]
+    fn a_seam_has_the_same_normal_on_both_sides() {
+        let (mut positions, mut triangles) = cube();
+        // Every corner its own vertex.
+        positions = triangles
+            .as_flattened()
+            .iter()
+            .map(|&i| positions[i as usize])
+            .collect();
+        for (i, corner) in triangles.as_flattened_mut().iter_mut().enumerate() {
+            *corner = i as u32;
+        }
+        let smooth = smooth(&positions, &triangles, PI);
+        let bits = |v: Vec3| v.to_array().map(f32::to_bits);
+        for (i, p) in positions.iter().enumerate() {
+            for (j, q) in positions.iter().enumerate() {
+                if p == q {
+                    assert_eq!(bits(smooth.normals[i]), bits(smooth.normals[j]));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_cube_creases_below_ninety_degrees_and_not_above() {
+        let (positions, triangles) = cube();
+        assert!(
+            smooth(&positions, &triangles, FRAC_PI_2 + 0.01)
+                .copies
+                .is_empty()
+        );
+        for crease_angle in [FRAC_PI_2 - 0.01, 0.0] {
+            let sharp = smooth(&positions, &triangles, crease_angle);
+            // Three sides meet at each corner; the two triangles of a side share their vertices.
+            assert_eq!(sharp.copies.len(), 16);
+            let all: Vec<Vec3> = positions
+                .iter()
+                .copied()
+                .chain(sharp.copies.iter().map(|&i| positions[i as usize]))
+                .collect();
+            for (new, old) in sharp.triangles.iter().zip(&triangles) {
+                let face = face_normal(old.map(|i| positions[i as usize])).as_vec3();
+                assert_eq!(new.map(|i| sharp.normals[i as usize]), [face; 3]);
+                let moved = new.map(|i| all[i as usize]);
+                assert_eq!(moved, old.map(|i| positions[i as usize]));
+            }
+        }
+    }
+
+    #[test]
+    fn both_sides_of_a_sheet_keep_their_own_normals() {
+        let positions = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let sheet = smooth(&positions, &[[0, 1, 2], [0, 2, 1]], PI);
+        assert_eq!(sheet.copies.len(), 3);
+        let normals = |t: usize| sheet.triangles[t].map(|i| sheet.normals[i as usize]);
+        assert_eq!(normals(0), [Vec3::Z; 3]);
+        assert_eq!(normals(1), [-Vec3::Z; 3]);
+    }
+
+    #[test]
+    fn minus_zero_and_zero_are_one_position() {
+        let positions = [vec3(0.0, 1.0, 0.0), vec3(-0.0, 1.0, 0.0)];
+        assert_eq!(weld(&positions), [0, 0]);
     }
 }

@@ -220,6 +220,8 @@ const LOSSLESS: [Compression; 5] = [
     Compression::PIZ,
 ];
 
+const LOSSY: [Compression; 3] = [Compression::PXR24, Compression::B44, Compression::B44A];
+
 #[test]
 fn exr_halves_and_floats_are_exact_in_every_lossless_compression() {
     let folder = Folder::new();
@@ -328,15 +330,48 @@ fn truncated_files_are_refused() {
         &folder.tiff::<colortype::Gray32Float>(size, size, &floats),
         load,
     );
-    for compression in LOSSLESS
-        .into_iter()
-        .chain([Compression::PXR24, Compression::B44])
-    {
+    for compression in LOSSLESS.into_iter().chain(LOSSY) {
         let channels = vec![("Y", FlatSamples::F32(floats.clone()))];
         each_tenth(
             &folder.exr((48, 48), compression, vec![(None, channels)]),
             load,
         );
+    }
+}
+
+#[test]
+fn damaged_files_are_read_or_refused() {
+    let folder = Folder::new();
+    let size = 12;
+    let floats: Vec<f32> = noise(size * size).map(|n| n as f32).collect();
+    let gray: Vec<u8> = noise(size * size).map(|n| n as u8).collect();
+    let picture = GrayImage::from_raw(size as u32, size as u32, gray).unwrap();
+    let mut paths = Vec::new();
+    for format in [ImageFormat::Png, ImageFormat::Jpeg] {
+        let path = folder.path(format.to_mime_type().rsplit('/').next().unwrap());
+        std::fs::rename(folder.picture(format, picture.clone()), &path).unwrap();
+        paths.push(path);
+    }
+    paths.push(folder.tiff::<colortype::Gray32Float>(size as u32, size as u32, &floats));
+    for compression in LOSSLESS.into_iter().chain(LOSSY) {
+        let channels = vec![("Y", FlatSamples::F32(floats.clone()))];
+        let path = folder.path(&format!("{compression}.exr").replace(' ', ""));
+        let written = folder.exr((size, size), compression, vec![(None, channels)]);
+        std::fs::rename(written, &path).unwrap();
+        paths.push(path);
+    }
+    for path in paths {
+        let whole = std::fs::read(&path).unwrap();
+        // Headers are dense with meaning, what follows is not.
+        let places = (0..whole.len()).filter(|&at| at < 40 || at % (whole.len() / 60) == 0);
+        for at in places {
+            for damage in [0xff, 0x01] {
+                let mut bytes = whole.clone();
+                bytes[at] ^= damage;
+                std::fs::write(&path, bytes).unwrap();
+                let _: Result<_, ImageError> = load(&path);
+            }
+        }
     }
 }
 
@@ -383,6 +418,10 @@ fn a_header_that_claims_too_much_is_refused_at_once() {
         bytes[at + 8..at + 12].copy_from_slice(&99_999i32.to_le_bytes());
         bytes[at + 12..at + 16].copy_from_slice(&99_999i32.to_le_bytes());
     }
+    // The header is believed only when its number of blocks of 16 lines fits.
+    let count = b"chunkCount\0int\0";
+    let at = bytes.windows(count.len()).position(|w| w == count).unwrap() + count.len() + 4;
+    bytes[at..at + 4].copy_from_slice(&6_250i32.to_le_bytes());
     std::fs::write(&path, bytes).unwrap();
     refused(&path);
 }

@@ -1,6 +1,6 @@
 //! A measured or painted surrounding: an equirectangular HDR picture, sampled by its brightness.
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -73,10 +73,10 @@ fn bilinear(image: &EnvironmentImage, at: Vec2) -> Vec3 {
 impl InfiniteLight for Environment {
     fn radiance(&self, direction: Vec3) -> Vec3 {
         let local = self.to_picture(direction);
-        let azimuth = local.x.atan2(-local.z) / TAU + 0.5;
-        let polar = local.y.clamp(-1.0, 1.0).acos() / PI;
+        let point = latlong::point(local);
+        let polar = point.y.acos() / PI;
         let size = Vec2::new(self.image.width as f32, self.image.height as f32);
-        self.strength * bilinear(&self.image, Vec2::new(azimuth, polar) * size)
+        self.strength * bilinear(&self.image, Vec2::new(point.x, polar) * size)
     }
 
     fn sample(&self, _normal: Vec3, u: Vec2) -> LightSample {
@@ -108,7 +108,9 @@ mod tests {
         rotation: f32,
         f: impl Fn(usize, usize) -> Vec3,
     ) -> Environment {
-        let pixels = (0..width * height).map(|i| f(i % width, i / width)).collect();
+        let pixels = (0..width * height)
+            .map(|i| f(i % width, i / width))
+            .collect();
         let image = EnvironmentImage {
             width,
             height,
@@ -119,9 +121,15 @@ mod tests {
 
     #[test]
     fn directions_read_the_pixels_they_should() {
-        let light = picture(8, 4, |column, row| Vec3::new(column as f32, row as f32, 1.0));
+        let light = picture(8, 4, |column, row| {
+            Vec3::new(column as f32, row as f32, 1.0)
+        });
         // The middle of the picture looks along -Z, between columns 3 and 4 and rows 1 and 2.
-        assert!(light.radiance(Vec3::NEG_Z).abs_diff_eq(Vec3::new(3.5, 1.5, 1.0), 1e-4));
+        assert!(
+            light
+                .radiance(Vec3::NEG_Z)
+                .abs_diff_eq(Vec3::new(3.5, 1.5, 1.0), 1e-4)
+        );
         assert!((light.radiance(Vec3::X).x - 5.5).abs() < 1e-4);
         assert!(light.radiance(Vec3::Y).y < 1e-4);
         assert!((light.radiance(Vec3::NEG_Y).y - 3.0).abs() < 1e-4);
@@ -141,7 +149,11 @@ mod tests {
     #[test]
     fn one_bright_pixel_is_found_and_its_light_is_exact() {
         let light = picture(64, 32, |column, row| {
-            Vec3::splat(if (column, row) == (20, 9) { 1000.0 } else { 0.0 })
+            Vec3::splat(if (column, row) == (20, 9) {
+                1000.0
+            } else {
+                0.0
+            })
         });
         let n = 20_000;
         let mut power = 0.0;
@@ -154,7 +166,7 @@ mod tests {
         // The bilinear bump of one pixel integrates to the pixel's solid angle (up to the change of
         // sin(theta) over its three rows).
         let border = |row: usize| (PI * row as f32 / 32.0).cos();
-        let expected = 1000.0 * TAU / 64.0 * (border(9) - border(10));
+        let expected = 1000.0 * 2.0 * PI / 64.0 * (border(9) - border(10));
         assert!((power / expected - 1.0).abs() < 0.02, "{power} {expected}");
     }
 }

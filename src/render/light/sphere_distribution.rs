@@ -163,7 +163,9 @@ mod tests {
         let mut state = 1_u64;
         let mut random = || {
             // Knuth's MMIX generator, upper bits.
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             (state >> 40) as f32 / (1 << 24) as f32
         };
         for _ in 0..n {
@@ -190,7 +192,10 @@ mod tests {
         }
         // Mean k, standard deviation sqrt(2 k): 4 of them is a chance below 1e-3.
         let freedom = (cells - 1) as f32;
-        assert!(chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(), "{chi_square}");
+        assert!(
+            chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(),
+            "{chi_square}"
+        );
     }
 
     #[test]

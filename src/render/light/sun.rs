@@ -124,7 +124,10 @@ mod tests {
         }
         let expected = 2.0 * through_air(0.64, 3.0) / KILOCANDELA_PER_UNIT;
         assert!(irradiance.abs_diff_eq(expected, 1e-3), "{irradiance}");
-        assert_eq!(sun.radiance(Vec3::new(0.61, 0.64, 0.48).normalize()), Vec3::ZERO);
+        assert_eq!(
+            sun.radiance(Vec3::new(0.61, 0.64, 0.48).normalize()),
+            Vec3::ZERO
+        );
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::surface::{UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
 pub(in crate::scene) const SCALE: &str =
-    "scale, world units from height 0 to height 1: a number other than 0";
+    "world units from height 0 to height 1: a number other than 0";
 
 /// One mesh as written.
 #[derive(Debug)]
@@ -77,11 +77,14 @@ impl MeshTable {
             mask: section
                 .optional("mask", |i| i.integer(0..=u32::MAX))?
                 .unwrap_or(u32::MAX),
-            transform: section.optional("transform", transform)?.unwrap_or_default(),
-            instances: section.optional("instances", instances)?.unwrap_or_default(),
-            displacement: section.optional("displacement", |i| {
-                DisplacementTable::read(i, folder)
-            })?,
+            transform: section
+                .optional("transform", transform)?
+                .unwrap_or_default(),
+            instances: section
+                .optional("instances", instances)?
+                .unwrap_or_default(),
+            displacement: section
+                .optional("displacement", |i| DisplacementTable::read(i, folder))?,
         })
     }
 }

@@ -27,8 +27,7 @@ pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
 pub struct LoadMeshError {
     /// The file that was asked for.
     pub path: PathBuf,
-    /// What is wrong with it.
-    #[source]
+    /// What is wrong with it; part of the message.
     pub kind: LoadMeshErrorKind,
 }
 
@@ -196,7 +195,7 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     if !MESH_EXTENSIONS.contains(&extension.as_str()) {
         return Err(LoadMeshErrorKind::UnknownExtension { found: extension });
     }
-    let bytes = std::fs::read(path).map_err(|source| LoadMeshErrorKind::Read {
+    let bytes = read_regular(path).map_err(|source| LoadMeshErrorKind::Read {
         what: "the file".into(),
         source,
     })?;
@@ -216,6 +215,14 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
         part.name = stem.clone().into_owned();
     }
     Ok(file)
+}
+
+/// The bytes of a regular file: a mesh file that names a device must not make us read for ever.
+fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("not a regular file"));
+    }
+    std::fs::read(path)
 }
 
 /// Sorts meshes into parts by material and by whether they have texture coordinates.
@@ -269,4 +276,59 @@ fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
         .windows(2)
         .skip(1)
         .map(|pair| [corners[0], pair[0], pair[1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writes `bytes` to a file of that name in a fresh folder and loads it.
+    pub(super) fn load_bytes(name: &str, bytes: &[u8]) -> Result<LoadedFile, LoadMeshError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let result = load_mesh(&path);
+        if let Err(e) = &result {
+            assert!(e.to_string().contains(name), "{e} does not name the file");
+        }
+        result
+    }
+
+    #[test]
+    fn an_unknown_ending_lists_the_known_ones() {
+        for name in ["mesh.fbx", "mesh"] {
+            let message = load_bytes(name, b"x").unwrap_err().to_string();
+            for known in MESH_EXTENSIONS {
+                assert!(message.contains(known), "{message}");
+            }
+        }
+    }
+
+    #[test]
+    fn missing_and_empty_files_are_refused() {
+        let missing = load_mesh(Path::new("no/such/mesh.obj")).unwrap_err();
+        assert!(matches!(missing.kind, LoadMeshErrorKind::Read { .. }));
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("mesh.obj");
+        std::fs::create_dir(&folder).unwrap();
+        let refused = load_mesh(&folder).unwrap_err();
+        assert!(matches!(refused.kind, LoadMeshErrorKind::Read { .. }));
+        for known in MESH_EXTENSIONS {
+            let empty = load_bytes(&format!("mesh.{known}"), b"").unwrap_err();
+            assert!(matches!(empty.kind, LoadMeshErrorKind::Empty));
+        }
+    }
+
+    #[test]
+    fn the_ending_may_be_in_capitals() {
+        let file = load_bytes("MESH.OBJ", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        assert_eq!(file.parts[0].name, "MESH");
+    }
+
+    #[test]
+    fn fans_cover_a_polygon() {
+        let cut: Vec<_> = fan(&[7, 8, 9, 4, 5]).collect();
+        assert_eq!(cut, [[7, 8, 9], [7, 9, 4], [7, 4, 5]]);
+        assert_eq!(fan(&[1, 2]).count(), 0);
+    }
 }

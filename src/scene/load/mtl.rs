@@ -198,3 +198,65 @@ fn numbers(mut text: &str, most: usize) -> (Vec<f32>, &str) {
     }
     (values, text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn displacement(statement: &str) -> FileDisplacement {
+        Map::parse(statement).displacement(Path::new("lib/rock.mtl"))
+    }
+
+    #[test]
+    fn a_name_with_spaces_follows_the_options() {
+        let map =
+            displacement("-mm -0.5 2 -s 3 4 1 -o 0.25 -clamp on -imfchan r my height map.png");
+        assert_eq!(map.path, Path::new("lib/my height map.png"));
+        assert_eq!(map.scale, Some(2.0));
+        assert_eq!(map.midlevel, Some(0.25));
+        assert_eq!(map.uv.scale, Vec2::new(3.0, 4.0));
+        assert_eq!(map.uv.offset, Vec2::new(0.25, 0.0));
+        assert_eq!(map.wrap, Some(Wrap::Clamp));
+        assert_eq!(map.channel, Some("r"));
+    }
+
+    #[test]
+    fn a_plain_name_says_nothing_else() {
+        let map = displacement("textures\\h.png");
+        assert_eq!(map.path, Path::new("lib/textures/h.png"));
+        assert_eq!((map.scale, map.midlevel, map.wrap), (None, None, None));
+    }
+
+    #[test]
+    fn bump_multiplier_is_the_scale() {
+        assert_eq!(displacement("-bm 0.3 h.png").scale, Some(0.3));
+        let both = displacement("-bm 0.5 -mm 0.1 0.4 h.png");
+        assert_eq!((both.scale, both.midlevel), (Some(0.2), Some(-0.25)));
+    }
+
+    #[test]
+    fn options_without_their_numbers_do_no_harm() {
+        for statement in [
+            "-mm",
+            "-mm 1",
+            "-bm x.png",
+            "-s",
+            "-clamp",
+            "-",
+            "-mm 1 0 h.png",
+        ] {
+            displacement(statement);
+        }
+        assert_eq!(displacement("-bm").path, Path::new("lib/-bm"));
+    }
+
+    #[test]
+    fn unusable_statements_are_reported_and_left_out() {
+        let mut warnings = Vec::new();
+        let text = "newmtl a\nKd 0.5\nKd 1 2\nkd nan 0 0\nNs oops\nmap_Kd\nMAP_DISP h.png\n";
+        let cleaned = clean(text, Path::new("m.mtl"), &mut warnings);
+        assert_eq!(cleaned, "newmtl a\nKd 0.5 0.5 0.5\nmap_disp h.png\n");
+        assert_eq!(warnings.len(), 3, "{warnings:?}");
+        assert!(warnings[0].contains("m.mtl: line 3"));
+    }
+}

@@ -226,3 +226,133 @@ impl PropertyAccess for Skipped {
         Self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::load_bytes;
+    use super::*;
+
+    const PROPERTIES: &str = "element vertex 4\nproperty float x\nproperty double y\nproperty float z\n\
+        property float nx\nproperty float ny\nproperty float nz\nproperty uchar red\nproperty float s\nproperty float t\n\
+        element face 1\nproperty uchar flags\nproperty list uchar int vertex_indices\nend_header\n";
+
+    /// (x, y, z) of a square, with its normal along z and s = x, t = y.
+    const SQUARE: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+
+    fn ascii() -> Vec<u8> {
+        let mut text = format!("ply\nformat ascii 1.0\n{PROPERTIES}");
+        for [x, y] in SQUARE {
+            text += &format!("{x} {y} 0 0 0 1 255 {x} {y}\n");
+        }
+        text += "7 4 0 1 2 3\n";
+        text.into_bytes()
+    }
+
+    fn binary(big: bool) -> Vec<u8> {
+        let order = if big { "big" } else { "little" };
+        let mut bytes = format!("ply\nformat binary_{order}_endian 1.0\n{PROPERTIES}").into_bytes();
+        let mut put = |mut value: Vec<u8>| {
+            // Given in big endian.
+            if !big {
+                value.reverse();
+            }
+            bytes.extend(value);
+        };
+        for [x, y] in SQUARE {
+            put(x.to_be_bytes().into());
+            put(f64::from(y).to_be_bytes().into());
+            for value in [0.0_f32, 0.0, 0.0, 1.0] {
+                put(value.to_be_bytes().into());
+            }
+            put(vec![255]);
+            put(x.to_be_bytes().into());
+            put(y.to_be_bytes().into());
+        }
+        put(vec![7]);
+        put(vec![4]);
+        for index in 0..4_i32 {
+            put(index.to_be_bytes().into());
+        }
+        bytes
+    }
+
+    #[test]
+    fn the_three_encodings_give_the_same_mesh() {
+        for bytes in [ascii(), binary(false), binary(true)] {
+            let file = load_bytes("m.ply", &bytes).unwrap();
+            let mesh = &file.parts[0].mesh;
+            let corners = SQUARE.map(Vec2::from);
+            assert_eq!(mesh.positions, corners.map(|p| p.extend(0.0)));
+            assert_eq!(mesh.texcoords, corners);
+            assert_eq!(mesh.normals, [Vec3::Z; 4]);
+            assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+        }
+    }
+
+    #[test]
+    fn a_file_cut_off_anywhere_is_refused() {
+        for bytes in [ascii(), binary(false), binary(true)] {
+            // Without its last line break the text is still whole.
+            for length in 0..bytes.len() - 1 {
+                assert!(load_bytes("m.ply", &bytes[..length]).is_err(), "{length}");
+            }
+        }
+    }
+
+    fn replaced(from: &str, to: &str) -> LoadMeshErrorKind {
+        let text = String::from_utf8(ascii()).unwrap().replace(from, to);
+        load_bytes("m.ply", text.as_bytes()).unwrap_err().kind
+    }
+
+    #[test]
+    fn counts_beyond_the_file_are_refused_at_once() {
+        for count in ["4000000000", "18446744073709551615"] {
+            let kind = replaced("element vertex 4", &format!("element vertex {count}"));
+            assert!(kind.to_string().contains(count), "{kind}");
+            let empty = format!("element nothing {count}\nend_header");
+            assert!(
+                replaced("end_header", &empty)
+                    .to_string()
+                    .contains("nothing")
+            );
+        }
+        assert!(matches!(
+            replaced("7 4 0", "7 4000000000 0"),
+            LoadMeshErrorKind::Malformed { .. }
+        ));
+    }
+
+    #[test]
+    fn indices_out_of_range_name_the_face() {
+        for index in [4_i64, -1] {
+            let kind = replaced("7 4 0 1 2 3", &format!("7 4 0 1 2 {index}"));
+            assert!(
+                matches!(&kind, LoadMeshErrorKind::IndexOutOfRange { place, index: i, .. }
+                    if place == "face 0" && *i == index),
+                "{kind:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn headers_without_what_is_needed_are_refused() {
+        for (from, to) in [
+            ("property double y\n", ""),
+            ("property list uchar int vertex", "property int vertex"),
+            (
+                "property list uchar int vertex",
+                "property list uchar float vertex",
+            ),
+            ("format ascii 1.0\n", ""),
+            ("ply\n", "plx\n"),
+        ] {
+            let kind = replaced(from, to);
+            assert!(
+                matches!(kind, LoadMeshErrorKind::Malformed { .. }),
+                "{to:?}: {kind:?}"
+            );
+        }
+        let points = replaced("vertex_indices", "something_else");
+        assert!(matches!(points, LoadMeshErrorKind::NoFaces));
+    }
+}
