@@ -356,6 +356,7 @@ mod embree {
     use prismarch::demo::{DEMOS, Demo};
     use prismarch::embree::{EmbreeOptions, EmbreeTracer};
     use prismarch::scene::{Camera, Loaded};
+    use rayon::prelude::*;
 
     use super::*;
 
@@ -411,7 +412,7 @@ mod embree {
     /// Every demo's camera rays, and from every hit a ray to the sky.
     #[test]
     fn demos_look_the_same() {
-        for demo in DEMOS {
+        DEMOS.par_iter().for_each(|demo| {
             let folder = tempfile::tempdir().unwrap();
             let small = Demo {
                 map_size: 512,
@@ -445,7 +446,7 @@ mod embree {
                 }
             }
             compare_closely(&camera, &|r| bvh.intersect(r), &|r| embree.intersect(r));
-        }
+        });
     }
 
     fn is_displaced(world: &World, hit: &Hit) -> bool {
