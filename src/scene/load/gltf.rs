@@ -312,12 +312,45 @@ fn read_compressed(
         decoded.positions.len(),
         place,
     )?;
+    if let Some(accessor) = primitive.get(&Semantic::Positions) {
+        check_bounds(&decoded.positions, &accessor, &what)?;
+    }
     Ok(MeshBuilder {
         positions: decoded.positions,
         normals: decoded.normals,
         texcoords: decoded.texcoords.into_iter().map(v_up).collect(),
         triangles: decoded.triangles,
     })
+}
+
+/// A Draco stream has no checksum, and many a damaged one unpacks to a wild mesh: the box that the accessor
+/// must give tells.
+fn check_bounds(
+    positions: &[Vec3],
+    accessor: &Accessor,
+    what: &str,
+) -> Result<(), LoadMeshErrorKind> {
+    /// Of the longest side: more than any useful quantisation moves a vertex.
+    const SLACK: f32 = 0.05;
+    let corner = |value| serde_json::from_value(value).ok().map(Vec3::from_array);
+    let box_of_file = accessor
+        .min()
+        .and_then(corner)
+        .zip(accessor.max().and_then(corner));
+    let Some((min, max)) = box_of_file else {
+        return Ok(());
+    };
+    let slack = SLACK * (max - min).max_element();
+    let inside = |p: &&Vec3| p.cmpge(min - slack).all() && p.cmple(max + slack).all();
+    match positions.iter().find(|p| !inside(p)) {
+        Some(p) => Err(malformed(
+            what,
+            format!(
+                "it holds the position {p}, outside of {min} to {max} that the file gives; is it damaged?"
+            ),
+        )),
+        None => Ok(()),
+    }
 }
 
 fn view_bytes<'a>(document: &Document, view: usize, buffers: &'a [Vec<u8>]) -> Option<&'a [u8]> {
@@ -674,6 +707,7 @@ mod tests {
         }});
         let accessors = document["accessors"].as_array_mut().unwrap();
         let counts = [SHEET.vertices, SHEET.vertices, 3 * SHEET.triangles];
+        accessors[0]["max"] = json!([3.0, 2.0, 1.0]);
         for (accessor, count) in accessors.iter_mut().zip(counts) {
             accessor.as_object_mut().unwrap().remove("bufferView");
             accessor["count"] = json!(count);
@@ -718,6 +752,10 @@ mod tests {
         let mut few = compressed_document(&stream);
         few["accessors"][2]["count"] = json!(3);
         assert!(load_bytes("m.glb", &glb(&few, &stream)).is_err());
+        let mut beyond = compressed_document(&stream);
+        beyond["accessors"][0]["max"] = json!([2.0, 2.0, 1.0]);
+        let error = load_bytes("m.glb", &glb(&beyond, &stream)).unwrap_err();
+        assert!(error.to_string().contains("outside"), "{error}");
         let mut bare = compressed_document(&stream);
         bare["meshes"][0]["primitives"][0]["extensions"] = json!({});
         assert!(load_bytes("m.glb", &glb(&bare, &stream)).is_err());
