@@ -353,7 +353,7 @@ fn a_transform_without_an_inverse_is_refused() {
 
 #[cfg(feature = "embree")]
 mod embree {
-    use prismarch::demo::{DEMOS, Demo};
+    use prismarch::demo::DEMOS;
     use prismarch::embree::{EmbreeOptions, EmbreeTracer};
     use prismarch::scene::{Camera, Loaded};
     use rayon::prelude::*;
@@ -414,11 +414,7 @@ mod embree {
     fn demos_look_the_same() {
         DEMOS.par_iter().for_each(|demo| {
             let folder = tempfile::tempdir().unwrap();
-            let small = Demo {
-                map_size: 512,
-                ..*demo
-            };
-            let scene = Loaded::from_file(&small.write(folder.path()).unwrap())
+            let scene = Loaded::from_file(&demo.write(folder.path(), 512).unwrap())
                 .unwrap()
                 .scene;
             let world = scene.world().unwrap();
