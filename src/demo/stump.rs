@@ -40,7 +40,7 @@ const CUT_RINGS: [(usize, f32); 7] = [
 const PITH: f32 = 0.085;
 
 const HEIGHT: f32 = 0.95;
-const BELOW_GROUND: f32 = 0.06;
+const BELOW_GROUND: f32 = 0.04;
 /// v of the rim: the side below, the cut above.
 const RIM: f32 = 0.72;
 /// v of the pith: short of 1, lest a lookup there reads the bottom row, which repeats above it.
@@ -98,7 +98,7 @@ impl Trunk {
                     angle: TAU * (i as f32 + 0.55 * (a - 0.5)) / 7.0 + 0.5,
                     reach: mix(0.38, 0.95, b),
                     fall: mix(0.13, 0.24, c),
-                    width: mix(0.15, 0.23, unit(hash(42, i, 0, 0))),
+                    width: mix(0.18, 0.25, unit(hash(42, i, 0, 0))),
                 }
             })
             .collect();
@@ -162,7 +162,7 @@ impl Trunk {
         let angle = self.angle(u.rem_euclid(1.0));
         let r = part * self.radius(angle, y);
         // Roots wander sideways as they run out.
-        let bend = 0.32 * (3.0 * angle + 0.7).sin() * (r - 0.6).max(0.0).powi(2);
+        let bend = 0.2 * (3.0 * angle + 0.7).sin() * (r - 0.6).max(0.0).powi(2);
         let (sin, cos) = (angle + bend).sin_cos();
         // The tree leaned a little, and so does the cut.
         let tilt = 0.07 * (y / HEIGHT).max(0.0).powi(3) * r * (angle - 2.6).cos();
@@ -257,7 +257,7 @@ fn side_row(row: usize) -> f32 {
 
 /// Height above ground of the side at `t` in [0, 1]: rows crowd near the ground, where roots run flat.
 fn side_height(t: f32) -> f32 {
-    (HEIGHT + BELOW_GROUND) * t.powf(1.6) - BELOW_GROUND
+    (HEIGHT + BELOW_GROUND) * t.powf(1.3) - BELOW_GROUND
 }
 
 fn cut_v(part: f32) -> f32 {
@@ -288,7 +288,16 @@ fn bark(around: Vec2, t: f32) -> f32 {
     let flakes = 4.5 * fbm3(37, q * Vec3::new(85.0, 85.0, 75.0), Octaves::new(3));
     let steps = flakes.floor() + smoothstep(0.3, 0.7, flakes.rem_euclid(1.0));
     let swell = gradient3(38, 9.0 * q);
-    0.078 * plate + 0.0055 * plate * steps + 0.010 * fibre + 0.014 * swell + knot(around, t)
+    // The saw left no bark standing above the cut.
+    let sawn = mix(1.0, 0.62, smoothstep(0.965, 1.0, t));
+    let bark = sawn * (0.078 * plate + 0.0055 * plate * steps) + 0.010 * fibre + 0.014 * swell;
+    bark + 0.016 * moss(q, t) * (1.0 + 0.8 * gradient3(39, 150.0 * q)) + knot(around, t)
+}
+
+/// How mossy the bark is, 0 to 1: patches near the ground.
+fn moss(q: Vec3, t: f32) -> f32 {
+    let patches = fbm3(63, 13.0 * q, Octaves::new(4)) + 0.5 * (0.40 - t);
+    smoothstep(0.04, 0.20, patches)
 }
 
 /// The scar of a lost branch: a swollen collar around a rotten hole.
@@ -325,7 +334,7 @@ fn behind_hinge(p: Vec2) -> f32 {
 
 /// The felled surface.
 fn cut(angle: f32, r: f32) -> f32 {
-    const LEVEL: f32 = 0.05;
+    const LEVEL: f32 = 0.06;
     let ring = years(angle, r).rem_euclid(1.0);
     let worn = 0.0045 * smoothstep(0.0, 0.75, ring) * smoothstep(1.0, 0.85, ring);
     let p = on_cut(angle, r);
@@ -387,16 +396,17 @@ fn bark_color(around: Vec2, t: f32, relief: f32) -> Vec3 {
     let furrow = Vec3::new(0.035, 0.020, 0.013);
     let plate = Vec3::new(0.20, 0.145, 0.105)
         .lerp(Vec3::new(0.30, 0.26, 0.215), smoothstep(-0.3, 0.4, mottle));
-    let mut color = furrow.lerp(plate, smoothstep(-0.16, 0.07, relief));
+    let mut color = furrow.lerp(plate, smoothstep(-0.13, 0.10, relief));
     let lichen = fbm3(62, 55.0 * q, Octaves::new(3));
     color = color.lerp(
         Vec3::new(0.42, 0.44, 0.34),
         0.7 * smoothstep(0.28, 0.42, lichen) * smoothstep(-0.02, 0.06, relief),
     );
-    let moss = fbm3(63, 13.0 * q, Octaves::new(4)) + 0.55 * (0.42 - t);
-    let green = Vec3::new(0.075, 0.12, 0.022)
-        .lerp(Vec3::new(0.19, 0.25, 0.05), smoothstep(-0.4, 0.5, lichen));
-    color.lerp(green, 0.9 * smoothstep(0.02, 0.22, moss))
+    let green = Vec3::new(0.045, 0.075, 0.014).lerp(
+        Vec3::new(0.15, 0.19, 0.035),
+        smoothstep(-0.4, 0.5, lichen + 3.0 * relief),
+    );
+    color.lerp(green, 0.92 * moss(q, t))
 }
 
 fn cut_color(angle: f32, r: f32, relief: f32) -> Vec3 {

@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::atlas::{Band, Trim, chart, trim_chart};
 use crate::demo::noise::{mix, smoothstep};
+use crate::demo::shape::frames_along;
 use crate::demo::sweep::{Ring, Sweep};
 
 /// Place and orientation on a path; `side` = `forward` x `up`.
@@ -82,10 +83,15 @@ impl Spine {
             let axis = Vec3::new(mix(1.62, -1.02, part), mix(1.28, 1.52, part), -0.1);
             knots.push((axis + radius * out, out));
         }
-        // The neck swings out to the left and lifts the head.
-        for (x, y, z) in [(-1.35, 2.15, 0.75), (-1.62, 2.02, 1.12)] {
-            knots.push((Vec3::new(x, y, z), Vec3::new(-0.1, 1.0, 0.1)));
-        }
+        // The neck comes over the top and swings out to the left, where it carries the head.
+        knots.extend([
+            (Vec3::new(-1.10, 2.20, -0.88), Vec3::new(0.0, 0.65, -0.75)),
+            (Vec3::new(-1.16, 2.46, -0.50), Vec3::new(0.0, 0.95, -0.3)),
+            (Vec3::new(-1.22, 2.50, -0.05), Vec3::Y),
+            (Vec3::new(-1.30, 2.36, 0.38), Vec3::new(0.0, 1.0, 0.25)),
+            (Vec3::new(-1.44, 2.17, 0.76), Vec3::new(0.0, 1.0, 0.25)),
+            (Vec3::new(-1.66, 2.08, 1.12), Vec3::Y),
+        ]);
         Self::through(&knots)
     }
 
@@ -273,8 +279,8 @@ pub(super) fn add_spines(sweep: &mut Sweep, spine: &Spine) {
             let tall = mix(1.0, 0.72, (part - 0.32) / 0.4);
             Spike {
                 root: Frame::new(root, frame.up - 0.35 * frame.forward, frame.forward),
-                length: tall * (0.06 + 0.85 * r),
-                half: Vec2::new(0.16 * r + 0.004, 0.46 * r + 0.004),
+                length: tall * (0.10 + 1.05 * r),
+                half: Vec2::new(0.15 * r + 0.006, 0.52 * r + 0.006),
                 bend: -0.55 * frame.forward,
                 around: 5,
                 rings: 3,
@@ -282,6 +288,30 @@ pub(super) fn add_spines(sweep: &mut Sweep, spine: &Spine) {
             }
             .add(sweep);
         }
+    }
+}
+
+/// A flame of spikes at the end of the tail.
+pub(super) fn add_tuft(sweep: &mut Sweep, spine: &Spine) {
+    let tail = spine.frame(0.0);
+    for (side, up, length) in [
+        (0.0, 0.0, 0.62),
+        (0.30, 0.30, 0.46),
+        (-0.30, 0.30, 0.46),
+        (0.25, -0.35, 0.40),
+        (-0.25, -0.35, 0.40),
+    ] {
+        let out = tail.vector(Vec3::new(side, up, 0.0));
+        Spike {
+            root: Frame::new(tail.origin, out - tail.forward, tail.up),
+            length,
+            half: Vec2::splat(0.034),
+            bend: 0.35 * tail.up - 0.5 * out,
+            around: 6,
+            rings: 5,
+            trim: Trim::Spine,
+        }
+        .add(sweep);
     }
 }
 
@@ -309,11 +339,12 @@ fn add_leg(sweep: &mut Sweep, body: &Frame, r: f32, size: f32, hand: f32) {
     let points: Vec<Vec3> = joints.iter().map(|&(p, _)| place(p)).collect();
     let last = points.len() - 1;
     let along = |i: usize| points[(i + 1).min(last)] - points[i.saturating_sub(1)];
-    let rings: Vec<Vec<Vec3>> = (0..=last)
-        .map(|i| {
-            let half = size * joints[i].1;
-            Frame::new(points[i], along(i), body.up + 0.6 * body.forward)
-                .ellipse(12, Vec2::new(half, half))
+    let rings: Vec<Vec<Vec3>> = frames_along(&points)
+        .iter()
+        .enumerate()
+        .map(|(i, &(_, up))| {
+            let half = Vec2::splat(size * joints[i].1);
+            Frame::new(points[i], along(i), up).ellipse(12, half)
         })
         .collect();
     let foot = Frame::new(points[last], along(last), body.up);

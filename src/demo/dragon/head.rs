@@ -116,7 +116,7 @@ impl Head<'_> {
     }
 
     fn skull(&self, sweep: &mut Sweep) {
-        const RINGS: usize = 30;
+        const RINGS: usize = 25;
         let carve = |p: Vec3| {
             let side = p.x.abs();
             let upper = smoothstep(0.02, 0.10, p.y);

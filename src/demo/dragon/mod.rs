@@ -23,7 +23,7 @@ pub const DEMO: Demo = Demo {
 };
 
 const COLOR_SIZE: usize = 2048;
-const PEARL_RADIUS: f32 = 0.26;
+const PEARL_RADIUS: f32 = 0.17;
 
 fn make(map_size: usize) -> DemoFiles {
     let heights = paint::heights(map_size, skin::height);
@@ -45,6 +45,7 @@ fn mesh() -> MeshBuilder {
     body::add_body(&mut sweep, &spine);
     body::add_spines(&mut sweep, &spine);
     body::add_legs(&mut sweep, &spine);
+    body::add_tuft(&mut sweep, &spine);
     let neck = spine.frame(1.0);
     let head = body::Frame::new(
         neck.origin,
@@ -54,7 +55,7 @@ fn mesh() -> MeshBuilder {
     head::add_head(&mut sweep, &head, 0.92);
     // The pearl takes the triangles that are left.
     let left = DEMO.triangles - sweep.triangles();
-    let pearl = head.point(Vec3::new(0.10, -0.42, 1.25));
+    let pearl = head.point(Vec3::new(0.22, -0.62, 1.0));
     body::add_ball(&mut sweep, pearl, PEARL_RADIUS, Vec3::Y, left, Trim::Pearl);
     sweep.finish()
 }
@@ -62,9 +63,9 @@ fn mesh() -> MeshBuilder {
 fn scene(scale: f32, midlevel: f32) -> String {
     format!(
         r#"[camera]
-position = [-1.2, 1.9, 8.2]
-target = [0.1, 1.42, 0.0]
-fov = 33.0
+position = [-1.5, 1.75, 8.0]
+target = [0.08, 1.42, 0.0]
+fov = 32.0
 
 [film]
 spp = 16
