@@ -213,9 +213,11 @@ impl SceneBuilder {
                 instance.commit()?;
             }
         }
-        // SAFETY: a live scene, exclusively borrowed: nobody traces it.
-        self.device
-            .guarded(|| unsafe { sys::pm_scene_commit(self.raw.0.as_ptr()) })?;
+        let commit = || {
+            // SAFETY: a live scene, exclusively borrowed: nobody traces it.
+            unsafe { sys::pm_scene_commit(self.raw.0.as_ptr()) }
+        };
+        self.device.guarded(commit)?;
         self.device.check()
     }
 }
