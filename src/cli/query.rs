@@ -4,14 +4,13 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use csv::ByteRecord;
 use rayon::prelude::*;
 
 use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
 use super::hits;
 use super::parse;
-use super::rays::{Layout, RayError, RayReader};
+use super::rays::{Layout, RayError, RayReader, Row};
 use crate::image::{Channel, atomic};
 use crate::prism::{March, Step};
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
@@ -243,7 +242,7 @@ enum Stop {
 impl Query<'_> {
     /// Traces all rays, chunk by chunk.
     fn run(&self, rays: &mut RayReader, out: &mut impl Write) -> Result<(), Stop> {
-        let mut rows = vec![ByteRecord::new(); CHUNK];
+        let mut rows = vec![Row::default(); CHUNK];
         let mut first = 0;
         out.write_all(hits::HEADER.as_bytes())
             .map_err(Stop::Write)?;
@@ -264,12 +263,7 @@ impl Query<'_> {
     }
 
     /// The hits of these rows, in order and in pieces; the first bad row is the error.
-    fn trace(
-        &self,
-        rows: &[ByteRecord],
-        first: u64,
-        layout: &Layout,
-    ) -> Result<Vec<Vec<u8>>, RayError> {
+    fn trace(&self, rows: &[Row], first: u64, layout: &Layout) -> Result<Vec<Vec<u8>>, RayError> {
         const PIECE: usize = 1 << 10;
         let pieces = rows.par_chunks(PIECE).enumerate();
         let traced: Vec<Result<Vec<u8>, RayError>> = pieces
@@ -281,12 +275,7 @@ impl Query<'_> {
         traced.into_iter().collect()
     }
 
-    fn trace_piece(
-        &self,
-        rows: &[ByteRecord],
-        first: u64,
-        layout: &Layout,
-    ) -> Result<Vec<u8>, RayError> {
+    fn trace_piece(&self, rows: &[Row], first: u64, layout: &Layout) -> Result<Vec<u8>, RayError> {
         let tracer = self.engine.tracer();
         let mut table = Vec::new();
         for (row, number) in rows.iter().zip(first..) {
