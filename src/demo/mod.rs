@@ -53,7 +53,13 @@ pub struct Demo {
 }
 
 /// The demos, in the order of `--list`.
-pub const DEMOS: &[Demo] = &[asteroid::DEMO, chainmail::DEMO, orb::DEMO, stump::DEMO, dragon::DEMO];
+pub const DEMOS: &[Demo] = &[
+    asteroid::DEMO,
+    chainmail::DEMO,
+    orb::DEMO,
+    stump::DEMO,
+    dragon::DEMO,
+];
 
 /// The demo of that name.
 pub fn find(name: &str) -> Option<&'static Demo> {

@@ -64,9 +64,13 @@ impl Demo {
 fn floor() -> MeshBuilder {
     let corners = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
     MeshBuilder {
-        positions: corners.map(|(x, z)| glam::Vec3::new(FLOOR * x, 0.0, FLOOR * z)).to_vec(),
+        positions: corners
+            .map(|(x, z)| glam::Vec3::new(FLOOR * x, 0.0, FLOOR * z))
+            .to_vec(),
         normals: vec![glam::Vec3::Y; 4],
-        texcoords: corners.map(|(x, z)| glam::Vec2::new(0.5 + 0.5 * x, 0.5 - 0.5 * z)).to_vec(),
+        texcoords: corners
+            .map(|(x, z)| glam::Vec2::new(0.5 + 0.5 * x, 0.5 - 0.5 * z))
+            .to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
     }
 }

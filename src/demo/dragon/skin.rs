@@ -108,10 +108,13 @@ fn segment(u: f32, t: f32, seed: u32) -> (f32, Scale) {
     let x = smoothstep(BELLY + 0.012, BELLY - 0.012, off);
     let seam = 0.75 * round(off - BELLY, 0.018);
     let q = ring_point(u, 0.3 * t);
-    let rough = 0.035 * fbm3(seed + 71, 150.0 * q, Octaves::new(3))
-        + 0.06 * gradient3(seed + 72, 13.0 * q);
+    let rough =
+        0.035 * fbm3(seed + 71, 150.0 * q, Octaves::new(3)) + 0.06 * gradient3(seed + 72, 13.0 * q);
     let skin = mix(scale.height, plates, x).max(seam) + rough;
-    (collar(u, t).max(skin * smoothstep(0.05, 0.11, t.min(1.0 - t))), scale)
+    (
+        collar(u, t).max(skin * smoothstep(0.05, 0.11, t.min(1.0 - t))),
+        scale,
+    )
 }
 
 /// Broad plates across the belly, overlapping towards the tail.
@@ -134,10 +137,8 @@ fn collar(u: f32, t: f32) -> f32 {
     let x = (u * 40.0).rem_euclid(1.0) - 0.5;
     let stud = 0.55 * round(x.hypot((d - 0.072) * 22.0), 0.36);
     let bed = 0.42 * smoothstep(COLLAR, COLLAR - 0.01, d);
-    let between = (bed + stud) * smoothstep(0.050, 0.060, d);
-    (outer * smoothstep(0.062, 0.056, d))
-        .max(inner * smoothstep(COLLAR, 0.11, d))
-        .max(between)
+    let inside = (bed + stud).max(inner * smoothstep(COLLAR, 0.11, d));
+    (outer * smoothstep(0.062, 0.056, d)).max(inside * smoothstep(0.050, 0.060, d))
 }
 
 /// The upper head: scales that shrink to wrinkles on the snout, brows, nostrils, a lip.
@@ -169,7 +170,11 @@ fn jaw(u: f32, t: f32) -> f32 {
     let floor = 0.3 + 0.1 * fbm3(96, 25.0 * q, Octaves::new(3));
     let lip = 0.75 * round(off - 0.30, 0.03);
     let skin = mix(below, floor, smoothstep(0.28, 0.33, off)).max(lip);
-    mix(0.3, skin + 0.05 * fbm3(97, 110.0 * q, Octaves::new(3)), ends(t))
+    mix(
+        0.3,
+        skin + 0.05 * fbm3(97, 110.0 * q, Octaves::new(3)),
+        ends(t),
+    )
 }
 
 /// 0 at both ends of a closed tube, where heights may depend on t alone.
@@ -180,9 +185,7 @@ fn ends(t: f32) -> f32 {
 /// Trims are turned on a lathe: heights depend on t alone.
 fn trim(trim: Trim, t: f32) -> f32 {
     match trim {
-        Trim::Horn => {
-            0.12 + 0.07 * (TAU * 13.0 * t).sin() * smoothstep(0.95, 0.6, t)
-        }
+        Trim::Horn => 0.12 + 0.07 * (TAU * 13.0 * t).sin() * smoothstep(0.95, 0.6, t),
         Trim::Spine => 0.08 + 0.05 * (TAU * 7.0 * t).cos() * smoothstep(0.9, 0.5, t),
         Trim::Whisker => 0.05 + 0.03 * (TAU * 24.0 * t).sin(),
         Trim::Eye => 0.1 + 0.22 * round(t - 1.0, 0.42),
