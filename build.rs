@@ -43,6 +43,15 @@ mod embree {
         let config = header(&embree.include, embree.major);
         println!("cargo::rerun-if-changed={}", config.display());
         println!("cargo::rustc-env=PRISMARCH_EMBREE={}", embree.version);
+        // For the C test of the shim.
+        println!(
+            "cargo::rustc-env=PRISMARCH_EMBREE_INCLUDE={}",
+            embree.include.display()
+        );
+        println!(
+            "cargo::rustc-env=PRISMARCH_EMBREE_LIB={}",
+            embree.lib.display()
+        );
         compile(&embree)?;
         generate()?;
         link(&embree);

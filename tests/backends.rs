@@ -15,7 +15,7 @@ use std::sync::Arc;
 use common::scene::{prisms, random, rock_map, sphere};
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use prismarch::bvh::{BvhError, BvhTracer};
-use prismarch::prism::{PrismHit, Prisms};
+use prismarch::prism::PrismHit;
 use prismarch::ray::Ray;
 use prismarch::surface::BaseMesh;
 use prismarch::trace::{Hit, INVALID_ID, Object, Placement, Shape, Tracer, World};
@@ -353,7 +353,10 @@ fn a_transform_without_an_inverse_is_refused() {
 
 #[cfg(feature = "embree")]
 mod embree {
+    use prismarch::demo::DEMOS;
     use prismarch::embree::{EmbreeOptions, EmbreeTracer};
+    use prismarch::scene::{Camera, Loaded};
+    use rayon::prelude::*;
 
     use super::*;
 
@@ -404,5 +407,60 @@ mod embree {
                 embree.intersect(r)
             });
         }
+    }
+
+    /// Every demo's camera rays, and from every hit a ray to the sky.
+    #[test]
+    fn demos_look_the_same() {
+        DEMOS.par_iter().for_each(|demo| {
+            let folder = tempfile::tempdir().unwrap();
+            let scene = Loaded::from_file(&demo.write(folder.path(), 512).unwrap())
+                .unwrap()
+                .scene;
+            let world = scene.world().unwrap();
+            let (bvh, embree) = both(&world);
+            let camera = camera_rays(&scene.camera, 160, 120);
+            let to_sky: Vec<Ray> = camera
+                .iter()
+                .filter_map(|ray| {
+                    let hit = bvh.intersect(ray)?;
+                    let up = Vec3::new(0.3, 0.9, 0.2) * ray.direction.length();
+                    Some(Ray {
+                        tnear: 1e-3,
+                        ..Ray::new(ray.at(hit.t), up)
+                    })
+                })
+                .collect();
+            for ray in camera.iter().chain(&to_sky) {
+                let (a, b) = (bvh.intersect(ray), embree.intersect(ray));
+                if let (Some(a), Some(b)) = (a, b)
+                    && (a.prim, a.geom, a.inst) == (b.prim, b.geom, b.inst)
+                    && a.inst[0] == INVALID_ID
+                    && is_displaced(&world, &a)
+                {
+                    assert_eq!(a, b, "{}: {ray:?}", demo.name);
+                }
+            }
+            compare_closely(&camera, &|r| bvh.intersect(r), &|r| embree.intersect(r));
+        });
+    }
+
+    fn is_displaced(world: &World, hit: &Hit) -> bool {
+        let object = &world.objects()[world.resolve(hit).object];
+        matches!(object.shape, Shape::Displaced(_))
+    }
+
+    fn camera_rays(camera: &Camera, width: u32, height: u32) -> Vec<Ray> {
+        let forward = (camera.target - camera.position).normalize();
+        let right = forward.cross(camera.up).normalize();
+        let down = forward.cross(right);
+        let pixel = 2.0 * (0.5 * camera.fov).tan() / height as f32;
+        let on_film = |i: u32, count: u32| (i as f32 + 0.5 - 0.5 * count as f32) * pixel;
+        (0..width * height)
+            .map(|i| {
+                let (x, y) = (on_film(i % width, width), on_film(i / width, height));
+                Ray::new(camera.position, forward + x * right + y * down)
+            })
+            .collect()
     }
 }

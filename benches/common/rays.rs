@@ -36,7 +36,7 @@ impl Rays {
             } else {
                 -hit.ng
             };
-            let mut from_here = |salt: u32| {
+            let from_here = |salt: u32| {
                 let mut ray = Ray::new(ray.at(hit.t), cosine(facing, 4 * index + salt));
                 ray.tnear = TNEAR;
                 ray

@@ -30,6 +30,9 @@ pub struct Args {
     /// List the demos
     #[arg(long)]
     list: bool,
+    /// Texels across and up of the displacement map, for a quick look [default: as in --list]
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u16).range(256..=16_384))]
+    map_size: Option<u16>,
     /// Write the scene, but render nothing
     #[arg(long)]
     no_render: bool,
@@ -51,10 +54,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.check_backend()?;
     args.engine.start_threads()?;
     let folder = args.out.clone().unwrap_or_else(|| demo.name.into());
+    let map_size = args.map_size.map_or(demo.map_size, usize::from);
     if !args.quiet {
         eprintln!("making {} in {}", demo.name, folder.display());
     }
-    let scene = demo.write(&folder)?;
+    let scene = demo.write(&folder, map_size)?;
     if args.no_render {
         return writeln!(std::io::stdout(), "{}", scene.display()).map_err(CliError::stdout);
     }
@@ -73,7 +77,9 @@ fn find(name: &str) -> Result<&'static Demo, CliError> {
     crate::demo::find(name).ok_or_else(|| {
         let names: Vec<_> = DEMOS.iter().map(|demo| demo.name).collect();
         let names = names.join(", ");
-        CliError::Usage(format!("there is no demo {name:?}; expected one of {names}"))
+        CliError::Usage(format!(
+            "there is no demo {name:?}; expected one of {names}"
+        ))
     })
 }
 

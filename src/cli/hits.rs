@@ -7,8 +7,7 @@ use glam::Vec3;
 use crate::trace::{Hit, World};
 
 /// The columns. `mesh` counts the objects of the scene, `prim` the triangles of that mesh, both from 0.
-pub const HEADER: &str =
-    "hit,t,mesh,prim,u,v,px,py,pz,ngx,ngy,ngz,nsx,nsy,nsz,displacement\n";
+pub const HEADER: &str = "hit,t,mesh,prim,u,v,px,py,pz,ngx,ngy,ngz,nsx,nsy,nsz,displacement\n";
 
 /// A ray that hits nothing: zeros throughout.
 const MISS: &[u8] = b"0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n";
@@ -25,7 +24,10 @@ pub fn append(rows: &mut Vec<u8>, world: &World, hit: Option<&Hit>) {
     let prim = hit.prim;
     let [p, ng, ns] = [point.position, point.geometric_normal, point.shading_normal].map(Triple);
     // Writing to memory does not fail.
-    let _ = writeln!(rows, "1,{t:?},{mesh},{prim},{u:?},{v:?},{p},{ng},{ns},{d:?}");
+    let _ = writeln!(
+        rows,
+        "1,{t:?},{mesh},{prim},{u:?},{v:?},{p},{ng},{ns},{d:?}"
+    );
 }
 
 /// Three numbers with commas between. `{:?}` of f32 is the shortest text that reads back, with an exponent

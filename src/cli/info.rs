@@ -133,7 +133,11 @@ fn sum(loaded: &Loaded, which: impl Fn(&ObjectShape) -> bool) -> usize {
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} ({})", self.scene, self.backend)?;
-        writeln!(f, "\n{:34} {:>11} {:>9}", "objects", "triangles", "instances")?;
+        writeln!(
+            f,
+            "\n{:34} {:>11} {:>9}",
+            "objects", "triangles", "instances"
+        )?;
         for object in &self.objects {
             let Object {
                 name,
@@ -170,7 +174,11 @@ impl Memory {
         row("overhead: prisms", self.overhead.prisms)?;
         row("total", self.total)?;
         let pictures = Bytes(self.pictures);
-        writeln!(f, "  {:32} {pictures:>11}", "besides: textures, environments")
+        writeln!(
+            f,
+            "  {:32} {pictures:>11}",
+            "besides: textures, environments"
+        )
     }
 }
 

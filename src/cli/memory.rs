@@ -66,18 +66,26 @@ impl Memory {
 }
 
 fn mesh_bytes(loaded: &Loaded) -> usize {
-    let meshes = loaded.scene.objects.iter().map(|object| match &object.shape {
-        ObjectShape::Displaced(surface, _) => surface.mesh(),
-        ObjectShape::Plain(mesh) => mesh,
-    });
+    let meshes = loaded
+        .scene
+        .objects
+        .iter()
+        .map(|object| match &object.shape {
+            ObjectShape::Displaced(surface, _) => surface.mesh(),
+            ObjectShape::Plain(mesh) => mesh,
+        });
     meshes.map(|mesh| mesh.bytes()).sum()
 }
 
 fn picture_bytes(loaded: &Loaded) -> usize {
-    let textures = loaded.scene.materials.iter().filter_map(|m| match &m.base_color {
-        Color::Texture(t) => Some((t.image.as_ref() as *const _ as usize, t.image.bytes())),
-        Color::Constant(_) => None,
-    });
+    let textures = loaded
+        .scene
+        .materials
+        .iter()
+        .filter_map(|m| match &m.base_color {
+            Color::Texture(t) => Some((t.image.as_ref() as *const _ as usize, t.image.bytes())),
+            Color::Constant(_) => None,
+        });
     let environments = loaded.scene.lights.iter().filter_map(|light| match light {
         Light::Environment { image, .. } => {
             let bytes = size_of_val(&image.pixels[..]);

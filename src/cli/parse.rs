@@ -62,7 +62,17 @@ mod tests {
         let size_of = |width, height| Ok(Size { width, height });
         assert_eq!(size("640x480"), size_of(640, 480));
         assert_eq!(size("1X65536"), size_of(1, 65536));
-        for bad in ["", "x", "640", "0x480", "640x0", "-1x1", "65537x1", "1x2x3", "65536x65536"] {
+        for bad in [
+            "",
+            "x",
+            "640",
+            "0x480",
+            "640x0",
+            "-1x1",
+            "65537x1",
+            "1x2x3",
+            "65536x65536",
+        ] {
             assert!(size(bad).is_err(), "{bad}");
         }
     }

@@ -63,7 +63,8 @@ impl Progress {
 fn bar() -> ProgressBar {
     let bar = ProgressBar::new(0);
     // The template is a constant; were it wrong, the default style would do.
-    if let Ok(style) = ProgressStyle::with_template("rendering [{wide_bar}] {percent} % {eta} left") {
+    if let Ok(style) = ProgressStyle::with_template("rendering [{wide_bar}] {percent} % {eta} left")
+    {
         bar.set_style(style.progress_chars("=> "));
     }
     bar

@@ -15,7 +15,7 @@ use super::rays::{Layout, RayError, RayReader};
 use crate::image::{Channel, atomic};
 use crate::prism::{March, Step};
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
-use crate::surface::{Displacement, UvTransform, Wrap};
+use crate::surface::{Displacement, Projection, UvTransform, Wrap};
 use crate::trace::World;
 
 /// Trace rays from a CSV table and write their hits
@@ -64,6 +64,9 @@ struct SurfaceArgs {
     /// Mesh file: .obj, .gltf, .glb or .ply
     #[arg(long, value_name = "FILE", requires_all = ["map", "scale"])]
     mesh: Option<PathBuf>,
+    /// Where the mesh's texture coordinates come from
+    #[arg(long, value_enum, value_name = "KIND", default_value_t = TexcoordKind::File, requires = "mesh")]
+    texcoords: TexcoordKind,
     /// Displacement map: PNG, TIFF, EXR, JPEG
     #[arg(long, value_name = "FILE", requires = "mesh")]
     map: Option<PathBuf>,
@@ -85,6 +88,32 @@ struct SurfaceArgs {
 enum MarchKind {
     /// Equal steps along the ray, as in the paper
     Uniform,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum TexcoordKind {
+    /// The mesh file
+    File,
+    /// Six sides around the mesh, each face takes the nearest
+    Box,
+    /// Longitude and latitude around the middle of the mesh
+    Spherical,
+    /// Longitude around the vertical axis, and height
+    Cylindrical,
+    /// Along the mesh's shortest side
+    Planar,
+}
+
+impl TexcoordKind {
+    fn projection(self) -> Option<Projection> {
+        match self {
+            Self::File => None,
+            Self::Box => Some(Projection::Box),
+            Self::Spherical => Some(Projection::Spherical),
+            Self::Cylindrical => Some(Projection::Cylindrical),
+            Self::Planar => Some(Projection::Planar),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -157,6 +186,7 @@ impl Args {
                 let Ok(channel): Result<Channel, _> = self.surface.channel.parse();
                 Ok(Loaded::from_mesh_and_map(&MeshAndMap {
                     mesh: mesh.clone(),
+                    texcoords: self.surface.texcoords.projection(),
                     map: map.clone(),
                     channel,
                     wrap: self.surface.wrap.into(),
@@ -215,7 +245,8 @@ impl Query<'_> {
     fn run(&self, rays: &mut RayReader, out: &mut impl Write) -> Result<(), Stop> {
         let mut rows = vec![ByteRecord::new(); CHUNK];
         let mut first = 0;
-        out.write_all(hits::HEADER.as_bytes()).map_err(Stop::Write)?;
+        out.write_all(hits::HEADER.as_bytes())
+            .map_err(Stop::Write)?;
         loop {
             let count = rays.read(&mut rows).map_err(|e| Stop::Because(e.into()))?;
             let tables = self

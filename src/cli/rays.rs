@@ -26,7 +26,9 @@ pub enum RayError {
         source: io::Error,
     },
     /// The header lacks a column, repeats one or has one that means nothing.
-    #[error("{file}:1: found {found}; expected the columns ox,oy,oz,dx,dy,dz and perhaps tnear,tfar")]
+    #[error(
+        "{file}:1: found {found}; expected the columns ox,oy,oz,dx,dy,dz and perhaps tnear,tfar"
+    )]
     Header {
         /// The file.
         file: String,
@@ -286,12 +288,20 @@ mod tests {
     #[test]
     fn columns_come_in_any_order_and_the_interval_is_optional() {
         let rays = read("dx,dy,dz,ox,oy,oz\n0,0,-2, 1,2,3\r\n\n1e-3,0,0,-1,0,0.5\n").unwrap();
-        assert_eq!(rays[0], Ray::new(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.0, -2.0)));
+        assert_eq!(
+            rays[0],
+            Ray::new(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.0, -2.0))
+        );
         assert_eq!(rays[1].direction.x, 1e-3);
         assert_eq!(rays.len(), 2);
-        let rays = read("tfar,ox,oy,oz,dx,dy,dz,tnear\n,0,0,0,1,0,0,\ninf,0,0,0,1,0,0,2\n7,0,0,0,1,0,0,7").unwrap();
+        let rays =
+            read("tfar,ox,oy,oz,dx,dy,dz,tnear\n,0,0,0,1,0,0,\ninf,0,0,0,1,0,0,2\n7,0,0,0,1,0,0,7")
+                .unwrap();
         let intervals: Vec<_> = rays.iter().map(|r| (r.tnear, r.tfar)).collect();
-        assert_eq!(intervals, [(0.0, f32::INFINITY), (2.0, f32::INFINITY), (7.0, 7.0)]);
+        assert_eq!(
+            intervals,
+            [(0.0, f32::INFINITY), (2.0, f32::INFINITY), (7.0, 7.0)]
+        );
     }
 
     #[test]
@@ -310,16 +320,34 @@ mod tests {
     #[test]
     fn bad_values_are_named_with_line_and_column() {
         let cases = [
-            ("ox,oy,oz,dx,dy,dz\n0,0,0,1,0,0\n0,0,0,0,-0,0\n", ":3: dx,dy,dz: found 0,-0,0"),
+            (
+                "ox,oy,oz,dx,dy,dz\n0,0,0,1,0,0\n0,0,0,0,-0,0\n",
+                ":3: dx,dy,dz: found 0,-0,0",
+            ),
             ("ox,oy,oz,dx,dy,dz\n0,0,0,nan,0,0\n", ":2: dx: found nan"),
             ("ox,oy,oz,dx,dy,dz\n0,0,0,1,-inf,0\n", ":2: dy: found -inf"),
             ("ox,oy,oz,dx,dy,dz\n0,0,0,1,1e99,0\n", ":2: dy: found 1e99"),
-            ("ox,oy,oz,dx,dy,dz\n\n0,zero,0,1,0,0\n", ":3: oy: found zero"),
+            (
+                "ox,oy,oz,dx,dy,dz\n\n0,zero,0,1,0,0\n",
+                ":3: oy: found zero",
+            ),
             ("ox,oy,oz,dx,dy,dz\n0,,0,1,0,0\n", ":2: oy: found nothing"),
-            ("ox,oy,oz,dx,dy,dz\n0,0,1,0,0\n", ":2: found 5 fields; expected 6"),
-            ("ox,oy,oz,dx,dy,dz,tnear\n0,0,0,1,0,0,-1\n", ":2: tnear: found -1"),
-            ("ox,oy,oz,dx,dy,dz,tfar\n0,0,0,1,0,0,nan\n", ":2: tfar: found nan"),
-            ("ox,oy,oz,dx,dy,dz,tnear,tfar\n0,0,0,1,0,0,2,1\n", ":2: tfar: found 1"),
+            (
+                "ox,oy,oz,dx,dy,dz\n0,0,1,0,0\n",
+                ":2: found 5 fields; expected 6",
+            ),
+            (
+                "ox,oy,oz,dx,dy,dz,tnear\n0,0,0,1,0,0,-1\n",
+                ":2: tnear: found -1",
+            ),
+            (
+                "ox,oy,oz,dx,dy,dz,tfar\n0,0,0,1,0,0,nan\n",
+                ":2: tfar: found nan",
+            ),
+            (
+                "ox,oy,oz,dx,dy,dz,tnear,tfar\n0,0,0,1,0,0,2,1\n",
+                ":2: tfar: found 1",
+            ),
         ];
         for (table, expected) in cases {
             let message = refusal(table);

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::engine::{EngineArgs, Engine};
+use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
 use super::memory::Memory;
 use super::parse::{self, Size};

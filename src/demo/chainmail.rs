@@ -116,10 +116,10 @@ fn zip(
 
 fn fallen_sheet() -> Sheet {
     let ball = Ball {
-        radius: 0.62,
+        radius: 0.50,
         skin: 0.03,
     };
-    let start = Vec3::new(0.0, 1.30, 0.0);
+    let start = Vec3::new(0.0, 1.06, 0.0);
     let sheet = drape::level_sheet(QUADS.0 + 1, QUADS.1 + 2, SPACING, start, 0.5);
     drape::drape(sheet, ball, 900)
 }
@@ -240,8 +240,8 @@ fn scene(scale: f32, midlevel: f32) -> String {
     format!(
         r#"# Chain mail of 1423 triangles, draped over a ball.
 [camera]
-position = [0.5, 1.75, 3.3]
-target = [0.0, 0.50, 0.05]
+position = [0.9, 1.9, 3.9]
+target = [0.0, 0.38, 0.05]
 fov = 37.0
 
 [film]

@@ -37,15 +37,16 @@ struct Tie {
 pub fn drape(mut sheet: Sheet, ball: Ball, steps: usize) -> Sheet {
     let ties = ties(&sheet);
     let mut before = sheet.points.clone();
-    let gravity = Vec3::new(0.0, -0.0011 * sheet.spacing / 0.1, 0.0);
+    let gravity = Vec3::new(0.0, -0.006 * sheet.spacing, 0.0);
     for _ in 0..steps {
         for (p, last) in sheet.points.iter_mut().zip(&mut before) {
             let velocity = 0.97 * (*p - *last);
             *last = *p;
             *p += velocity + gravity;
         }
-        for _ in 0..12 {
-            for tie in &ties {
+        // To and fro, so that the order of the ties does not push the sheet to one side.
+        for _ in 0..6 {
+            for tie in ties.iter().chain(ties.iter().rev()) {
                 restore(&mut sheet.points, tie);
             }
         }
@@ -83,10 +84,8 @@ fn ties(sheet: &Sheet) -> Vec<Tie> {
         (0, 1, 1.0),
         (1, 1, 0.35),
         (1, -1, 0.35),
-        (2, 0, 0.22),
-        (0, 2, 0.22),
-        (4, 0, 0.05),
-        (0, 4, 0.05),
+        (2, 0, 0.06),
+        (0, 2, 0.06),
     ];
     for j in 0..sheet.rows as i32 {
         for i in 0..sheet.columns as i32 {

@@ -9,6 +9,7 @@ mod dragon;
 mod drape;
 #[cfg(test)]
 mod laws;
+mod leather;
 mod noise;
 mod orb;
 mod paint;
@@ -56,6 +57,7 @@ pub struct Demo {
 pub const DEMOS: &[Demo] = &[
     asteroid::DEMO,
     chainmail::DEMO,
+    leather::DEMO,
     orb::DEMO,
     stump::DEMO,
     dragon::DEMO,

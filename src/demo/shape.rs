@@ -65,6 +65,7 @@ pub struct Chart {
     /// Its place in the map.
     pub rect: Rect,
     first: usize,
+    first_triangle: usize,
 }
 
 /// A point of the base surface.
@@ -98,11 +99,11 @@ pub fn add_grid(
         nv,
         rect,
         first,
+        first_triangle: mesh.triangles.len(),
     };
     for j in 0..nv {
         for i in 0..nu {
-            let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
-                .map(|(i, j)| chart.vertex(i, j) as u32);
+            let [a, b, c, d] = chart.quad(i, j);
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
@@ -152,6 +153,23 @@ impl Chart {
         self.first + j * (self.nu + 1) + i
     }
 
+    /// Corners of quad (i, j), counter-clockwise from the lower left.
+    fn quad(&self, i: usize, j: usize) -> [u32; 4] {
+        [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| self.vertex(i, j) as u32)
+    }
+
+    fn triangle(&self, i: usize, j: usize) -> usize {
+        self.first_triangle + 2 * (j * self.nu + i)
+    }
+
+    /// Cuts quad (i, j) along the falling diagonal (lower right to upper left) instead of the rising one.
+    pub fn cut_falling(&self, mesh: &mut MeshBuilder, i: usize, j: usize) {
+        let [a, b, c, d] = self.quad(i, j);
+        let first = self.triangle(i, j);
+        mesh.triangles[first] = [a, b, d];
+        mesh.triangles[first + 1] = [b, c, d];
+    }
+
     /// P and N' at texture coordinates `st`: exactly the surface that is displaced there. Outside the
     /// chart the nearest triangle goes on in its plane, which is what gutters are filled with.
     pub fn base_point(&self, mesh: &MeshBuilder, st: Vec2) -> BasePoint {
@@ -159,14 +177,16 @@ impl Chart {
         let i = (uv.x.max(0.0) as usize).min(self.nu - 1);
         let j = (uv.y.max(0.0) as usize).min(self.nv - 1);
         let (x, y) = (uv.x - i as f32, uv.y - j as f32);
-        let (a, c) = (self.vertex(i, j), self.vertex(i + 1, j + 1));
-        // The quad's third corner, and the barycentric coordinates of (a, third, c).
-        let (third, b) = if x >= y {
-            (self.vertex(i + 1, j), [1.0 - x, x - y, y])
-        } else {
-            (self.vertex(i, j + 1), [1.0 - y, y - x, x])
+        let [a, b, c, d] = self.quad(i, j).map(|k| k as usize);
+        let falling = mesh.triangles[self.triangle(i, j)][2] as usize == d;
+        let (corners, weights) = match (falling, x >= y, x + y <= 1.0) {
+            (false, true, _) => ([a, b, c], [1.0 - x, x - y, y]),
+            (false, false, _) => ([a, c, d], [1.0 - y, x, y - x]),
+            (true, _, true) => ([a, b, d], [1.0 - x - y, x, y]),
+            (true, _, false) => ([b, c, d], [1.0 - y, x + y - 1.0, 1.0 - x]),
         };
-        let blend = |of: &[Vec3]| b[0] * of[a] + b[1] * of[third] + b[2] * of[c];
+        let blend =
+            |of: &[Vec3]| (0..3).fold(Vec3::ZERO, |sum, k| sum + weights[k] * of[corners[k]]);
         BasePoint {
             position: blend(&mesh.positions),
             normal: blend(&mesh.normals).normalize_or(Vec3::Y),
@@ -231,6 +251,7 @@ mod tests {
         let chart = add_grid(&mut mesh, (3, 2), rect, |uv| {
             Vec3::new(uv.x, uv.y, (5.0 * uv.x * uv.y).sin())
         });
+        chart.cut_falling(&mut mesh, 1, 1);
         smooth_normals(&mut mesh);
         for t in &mesh.triangles {
             let corner = t.map(|i| mesh.positions[i as usize]);

@@ -29,13 +29,13 @@ pub enum WriteDemoError {
 }
 
 impl Demo {
-    /// Makes the demo and writes its files into `folder`, which is made if it is missing. Returns the scene file, which is
-    /// written last.
+    /// Makes the demo with maps of `map_size` x `map_size` and writes its files into `folder`, which is made if it is
+    /// missing. Returns the scene file, which is written last.
     ///
     /// # Errors
     ///
     /// [`WriteDemoError`], which names the file or folder. Files written before it stay.
-    pub fn write(&self, folder: &Path) -> Result<PathBuf, WriteDemoError> {
+    pub fn write(&self, folder: &Path, map_size: usize) -> Result<PathBuf, WriteDemoError> {
         std::fs::create_dir_all(folder).map_err(|source| WriteDemoError::Folder {
             folder: folder.to_owned(),
             source,
@@ -44,7 +44,7 @@ impl Demo {
         let scene = file(".toml");
         // Making the maps takes a while: an unwritable folder is found before.
         atomic::check(&scene)?;
-        let files: DemoFiles = (self.make)(self.map_size);
+        let files: DemoFiles = (self.make)(map_size);
         write_obj(&file(".obj"), &files.mesh)?;
         let size = files.map_size;
         write_png_gray16(&file("_height.png"), size, size, &files.heights)?;

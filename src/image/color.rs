@@ -136,47 +136,27 @@ fn rgb<S: Copy, T>(raster: &Raster, samples: &[S], convert: impl Fn(S) -> T) -> 
         .collect()
 }
 
+/// Refuses the first component, in rows from the bottom, that is not finite.
 fn linear_image(
     path: &Path,
     width: usize,
     height: usize,
     pixels: Vec<[f32; 3]>,
 ) -> Result<ColorImage, ImageError> {
-    check_pixels(
-        path,
-        width,
-        height,
-        &pixels,
-        f32::is_finite,
-        "colours must be finite",
-    )?;
+    let components = pixels.as_flattened();
+    if let Some(bad) = components.iter().position(|c| !c.is_finite()) {
+        return Err(ImageError::BadPixel {
+            path: path.to_owned(),
+            x: bad / 3 % width,
+            y: height - 1 - bad / 3 / width,
+            value: components[bad],
+        });
+    }
     Ok(ColorImage {
         width,
         height,
         pixels: ColorPixels::Linear(pixels),
     })
-}
-
-/// The first component, in rows from the bottom, that is not `good` is an error.
-pub(super) fn check_pixels(
-    path: &Path,
-    width: usize,
-    height: usize,
-    pixels: &[[f32; 3]],
-    good: impl Fn(f32) -> bool,
-    expected: &'static str,
-) -> Result<(), ImageError> {
-    let bad = pixels.as_flattened().iter().position(|&c| !good(c));
-    match bad {
-        None => Ok(()),
-        Some(component) => Err(ImageError::BadPixel {
-            path: path.to_owned(),
-            x: component / 3 % width,
-            y: height - 1 - component / 3 / width,
-            value: pixels.as_flattened()[component],
-            expected,
-        }),
-    }
 }
 
 #[cfg(test)]

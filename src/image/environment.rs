@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::color::{ColorPixels, ColorSpace, check_pixels, load_color};
+use super::color::{ColorPixels, ColorSpace, load_color};
 use super::{Format, ImageError, format};
 
 /// An equirectangular HDR picture: top row first, the top row is +Y, the middle column looks along -Z.
@@ -18,8 +18,11 @@ pub struct EnvironmentImage {
     pub pixels: Vec<Vec3>,
 }
 
-/// Reads an OpenEXR or Radiance HDR picture. A NaN, infinite or negative pixel is an error: one of them would
-/// poison every sum over the sphere.
+/// Reads an OpenEXR or Radiance HDR picture.
+///
+/// A NaN or infinite pixel is an error: one of them would poison every sum over the sphere. Negative radiance is read
+/// as 0: lossy compression (EXR's DWA above all) leaves it as ringing beside bright lights, in pictures that are
+/// otherwise sound, and no light is what such a pixel stands for.
 pub fn load_environment(path: &Path) -> Result<EnvironmentImage, ImageError> {
     let (format, _) = format::open(path)?;
     if !matches!(format, Format::Exr | Format::Hdr) {
@@ -37,19 +40,11 @@ pub fn load_environment(path: &Path) -> Result<EnvironmentImage, ImageError> {
             format,
         });
     };
-    check_pixels(
-        path,
-        width,
-        height,
-        &pixels,
-        |c| c >= 0.0,
-        "radiance must be finite and not negative",
-    )?;
     let pixels = pixels
         .chunks_exact(width)
         .rev()
         .flatten()
-        .map(|&pixel| pixel.into())
+        .map(|&pixel| Vec3::from(pixel).max(Vec3::ZERO))
         .collect();
     Ok(EnvironmentImage {
         width,

@@ -113,8 +113,8 @@ pub enum ImageError {
         /// Why.
         source: MapError,
     },
-    /// A NaN, infinite or, where it matters, negative pixel.
-    #[error("pixel ({x}, {y}) from the top left of {path} is {value}; {expected}")]
+    /// A NaN or infinite pixel.
+    #[error("pixel ({x}, {y}) from the top left of {path} is {value}; pixels must be finite")]
     BadPixel {
         /// The file.
         path: PathBuf,
@@ -124,8 +124,6 @@ pub enum ImageError {
         y: usize,
         /// The first bad component.
         value: f32,
-        /// What is wanted.
-        expected: &'static str,
     },
     /// A picture of low dynamic range where radiance is needed.
     #[error("{path} is a {format} picture; an environment needs OpenEXR or Radiance HDR")]

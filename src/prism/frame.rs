@@ -4,7 +4,8 @@
 //! vertex normals n_i have components (b, c, h). The parallel offset prism has its corners at height h at
 //! v_i + h m_i with m_i = n_i / (n_i . Ng), so the in-plane components of m_i are the first two of n_i over its
 //! third; keeping n_i instead of m_i and 1/(n_i . Ng) costs one division when a ray comes, and holds for faces
-//! with n_i . Ng <= 0 too.
+//! with n_i . Ng <= 0 too. v0 comes from the mesh, so that a ray is moved near the triangle before anything is
+//! multiplied (f32 keeps its digits far from the origin); the three floats saved hold the range of the surface.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3, Vec2, Vec3, Vec4};
@@ -18,9 +19,10 @@ pub struct Prism([f32; 27]);
 
 const _: () = assert!(size_of::<Prism>() == 108);
 
-const TRANSLATION: usize = 9;
-const NORMALS: usize = 12;
-const TEXELS: usize = 21;
+const NORMALS: usize = 9;
+const TEXELS: usize = 18;
+const RANGE: usize = 24;
+const STRETCH: usize = 26;
 
 impl Prism {
     /// The prism over a patch.
@@ -34,26 +36,38 @@ impl Prism {
         put(0, to_frame.x_axis);
         put(3, to_frame.y_axis);
         put(6, to_frame.z_axis);
-        put(TRANSLATION, -(to_frame * v0));
         for (i, &n) in patch.normals.iter().enumerate() {
             put(NORMALS + 3 * i, to_frame * n);
         }
         for (i, st) in patch.texels.iter().enumerate() {
             record[TEXELS + 2 * i..][..2].copy_from_slice(&st.as_vec2().to_array());
         }
+        // Outward by a rounding.
+        let [low, high] = patch.range();
+        let slack = 1e-6 * low.abs().max(high.abs());
+        record[RANGE] = (low - slack) as f32;
+        record[RANGE + 1] = (high + slack) as f32;
+        record[STRETCH] = (1.000_001 / patch.shortest_normal()) as f32;
         Self(record)
     }
 
-    /// A point in the frame: (b, c, h, b + c).
+    /// A vector in the frame: (b, c, h, b + c).
     #[inline(always)]
-    pub fn point(&self, p: Vec3) -> Vec4 {
-        with_sum(self.linear(p) + self.column(TRANSLATION))
+    pub fn vector(&self, d: Vec3) -> Vec4 {
+        with_sum(self.column(0) * d.x + self.column(3) * d.y + self.column(6) * d.z)
     }
 
-    /// A direction in the frame: (b, c, h, b + c).
+    /// Smallest and largest D.
     #[inline(always)]
-    pub fn direction(&self, d: Vec3) -> Vec4 {
-        with_sum(self.linear(d))
+    pub fn range(&self) -> [f32; 2] {
+        [self.0[RANGE], self.0[RANGE + 1]]
+    }
+
+    /// The range of w = D / |N'|.
+    #[inline(always)]
+    pub fn offsets(&self) -> [f32; 2] {
+        let ([low, high], stretch) = (self.range(), self.0[STRETCH]);
+        [low.min(low * stretch), high.max(high * stretch)]
     }
 
     /// n_i in the frame: (b, c, h, b + c).
@@ -74,11 +88,6 @@ impl Prism {
         self.0[NORMALS + 2]
             .min(self.0[NORMALS + 5])
             .min(self.0[NORMALS + 8])
-    }
-
-    #[inline(always)]
-    fn linear(&self, d: Vec3) -> Vec4 {
-        self.column(0) * d.x + self.column(3) * d.y + self.column(6) * d.z
     }
 
     /// Three floats as lanes; the fourth lane is whatever follows.
@@ -124,17 +133,12 @@ mod tests {
         let prism = Prism::new(&patch);
         let near = |a: Vec4, b: Vec4| assert!((a - b).abs().max_element() < 1e-5, "{a} {b}");
         let lift = 0.5 * patch.face_normal();
-        near(prism.point(vertices[0].as_vec3()), Vec4::ZERO);
-        near(
-            prism.point((vertices[1] + lift).as_vec3()),
-            Vec4::new(1.0, 0.0, 0.5, 1.0),
-        );
-        near(
-            prism.point((vertices[2] - lift).as_vec3()),
-            Vec4::new(0.0, 1.0, -0.5, 1.0),
-        );
+        let point = |p: DVec3| prism.vector((p - vertices[0]).as_vec3());
+        near(point(vertices[0]), Vec4::ZERO);
+        near(point(vertices[1] + lift), Vec4::new(1.0, 0.0, 0.5, 1.0));
+        near(point(vertices[2] - lift), Vec4::new(0.0, 1.0, -0.5, 1.0));
         for (i, n) in normals.iter().enumerate() {
-            near(prism.normal(i), prism.direction(n.as_vec3()));
+            near(prism.normal(i), prism.vector(n.as_vec3()));
             assert!((prism.normal(i).z - n.dot(patch.face_normal()) as f32).abs() < 1e-6);
         }
     }

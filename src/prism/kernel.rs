@@ -80,23 +80,14 @@ unsafe fn first_root_avx2(prisms: &Prisms, prim: u32, ray: &Ray) -> Option<Root>
 fn first_root<L: Lanes>(prisms: &Prisms, prim: u32, ray: &Ray) -> Option<Root> {
     let March::Uniform { step, jitter } = prisms.march;
     let record = &prisms.records[prim as usize];
+    let bent = || bent::intersect(&prisms.surface.patch(prim), ray, record.offsets(), step);
     if record.lowest_normal_height() <= BENT {
-        return bent::intersect(
-            &prisms.surface.patch(prim),
-            ray,
-            prisms.heights.displacement,
-            step,
-        );
+        return bent();
     }
-    let clipped = Path::clip(record, &prisms.heights, ray)?;
+    let clipped = Path::clip(record, prisms.surface.mesh().first_corner(prim), ray)?;
     let path = Path::new(record, &clipped);
     if !path.is_regular() {
-        return bent::intersect(
-            &prisms.surface.patch(prim),
-            ray,
-            prisms.heights.displacement,
-            step,
-        );
+        return bent();
     }
     let inside = inside(&path);
     if inside.intervals().is_empty() {
@@ -111,7 +102,7 @@ fn first_root<L: Lanes>(prisms: &Prisms, prim: u32, ray: &Ray) -> Option<Root> {
     let grid = Grid::new(prisms.surface.map());
     let field = Field {
         path: &path,
-        heights: &prisms.heights,
+        heights: &prisms.units,
         grid: &grid,
         spread,
     };
@@ -124,12 +115,19 @@ fn first_root<L: Lanes>(prisms: &Prisms, prim: u32, ray: &Ray) -> Option<Root> {
         step,
         speed: ray.direction.length(),
         first,
+        limit: (ray.tfar - path.t0) / path.dt,
     };
-    inside.intervals().iter().find_map(|&interval| {
-        field.march::<L, Root>(interval, &stepping, |crossing| {
-            polish(&prisms.surface.patch(prim), ray, &crossing).filter(|root| root.is_hit(ray))
-        })
-    })
+    let accept = |crossing| {
+        polish(&prisms.surface.patch(prim), ray, &crossing).filter(|root| root.is_hit(ray))
+    };
+    // A loop, not an iterator: lanes must not pass through functions that lack the kernel's instruction set.
+    for &interval in inside.intervals() {
+        let hit = field.march::<L, Root>(interval, &stepping, accept);
+        if hit.is_some() {
+            return hit;
+        }
+    }
+    None
 }
 
 /// A number in (0, 1] from a ray's key and a prism.

@@ -26,7 +26,7 @@ use crate::ray::{Aabb, Ray};
 use crate::surface::{DisplacedSurface, SurfacePoint};
 use frame::Prism;
 use kernel::Kernel;
-use path::HeightField;
+use path::HeightUnits;
 
 pub use march::{March, MarchError, Step};
 pub use simd::SimdLevel;
@@ -48,7 +48,7 @@ pub struct PrismHit {
 pub struct Prisms {
     surface: Arc<DisplacedSurface>,
     records: Vec<Prism>,
-    heights: HeightField,
+    units: HeightUnits,
     march: March,
     kernel: Kernel,
 }
@@ -64,24 +64,15 @@ impl Prisms {
         let records: Vec<Prism> = (0..count)
             .map(|prim| Prism::new(&surface.patch(prim)))
             .collect();
-        let (low, high) = surface.range();
-        let offset = (0..count)
-            .filter(|&prim| records[prim as usize].lowest_normal_height() > BENT)
-            .map(|prim| surface.patch(prim).offsets([low.into(), high.into()]))
-            .fold([low, high], |[a, b], [c, d]| {
-                [a.min(c as f32), b.max(d as f32)]
-            });
         let unit = surface.map().texels().unit();
-        let heights = HeightField {
-            displacement: [low, high],
-            offset,
+        let units = HeightUnits {
             texel_per_world: unit / surface.displacement().scale,
             texel_midlevel: unit * surface.displacement().midlevel,
         };
         Ok(Self {
             surface,
             records,
-            heights,
+            units,
             march,
             kernel: Kernel::new(SimdLevel::detect()),
         })
@@ -127,8 +118,11 @@ impl Prisms {
     /// the range, so it is in the hull of six corners; and no further than the largest |D| from the triangle.
     pub fn bounds(&self, prim: u32) -> Aabb {
         let patch = self.surface.patch(prim);
-        let [low, high] = self.heights.displacement.map(f64::from);
-        let offsets = patch.offsets([low, high]);
+        let record = &self.records[prim as usize];
+        let ([low, high], offsets) = (
+            record.range().map(f64::from),
+            record.offsets().map(f64::from),
+        );
         let (mut hull_min, mut hull_max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for (&v, &n) in patch.vertices.iter().zip(&patch.normals) {

@@ -15,13 +15,9 @@ use super::frame::Prism;
 use super::simd::{Grid, Lanes};
 use crate::ray::Ray;
 
-/// What the paths through all prisms of a surface share.
+/// The units of height that the paths through all prisms of a surface share.
 #[derive(Clone, Copy, Debug)]
-pub struct HeightField {
-    /// Smallest and largest D.
-    pub displacement: [f32; 2],
-    /// The same over the smallest |N'| of the regular prisms: the range of w.
-    pub offset: [f32; 2],
+pub struct HeightUnits {
     /// Stored texel values per world unit.
     pub texel_per_world: f32,
     /// The stored texel value that displaces by nothing.
@@ -65,12 +61,14 @@ const SIDE_EPSILON: f32 = 1e-4;
 
 impl Path {
     /// The part of `ray` that may be inside the prism; `None` when it misses the slabs around it.
+    ///
+    /// It is not cut at tfar: samples would move with it, and a hit with what else the ray has met before.
     #[inline(always)]
-    pub fn clip(prism: &Prism, field: &HeightField, ray: &Ray) -> Option<Clipped> {
-        let origin = prism.point(ray.origin);
-        let direction = prism.direction(ray.direction);
+    pub fn clip(prism: &Prism, v0: Vec3, ray: &Ray) -> Option<Clipped> {
+        let origin = prism.vector(ray.origin - v0);
+        let direction = prism.vector(ray.direction);
         let normals = [prism.normal(0), prism.normal(1), prism.normal(2)];
-        let (low, high) = slabs(field, &normals, prism.lowest_normal_height());
+        let (low, high) = slabs(prism, &normals);
         let pad = SIDE_EPSILON + 4.0 * f32::EPSILON * origin.abs().max_element();
         let height_pad = 4.0 * f32::EPSILON * (origin.z.abs() + low.z.abs() + high.z.abs());
         let pad = Vec4::new(pad, pad, height_pad, pad);
@@ -84,9 +82,9 @@ impl Path {
         );
         let (t0, t1) = (
             a.min(b).max_element().max(ray.tnear),
-            a.max(b).min_element().min(ray.tfar),
+            a.max(b).min_element(),
         );
-        (t0 < t1).then_some(Clipped {
+        (t0 < t1 && t0 < ray.tfar).then_some(Clipped {
             origin,
             direction,
             normals,
@@ -217,7 +215,7 @@ impl Path {
     pub fn above<L: Lanes>(
         &self,
         samples: Samples<L>,
-        field: &HeightField,
+        field: &HeightUnits,
         grid: &Grid<'_>,
         spread: Vec3,
     ) -> L {
@@ -251,23 +249,21 @@ pub struct Clipped {
 /// The prism's extent in b, c, h and b + c. S(b) = sum b_i (v_i + w n_i) for one w in the offset range, so it
 /// lies in the hull of the six corners; its height is D N'.Ng/|N'|, between D times the lowest n_i.Ng and D.
 #[inline(always)]
-fn slabs(field: &HeightField, normals: &[Vec4; 3], lowest: f32) -> (Vec4, Vec4) {
+fn slabs(prism: &Prism, normals: &[Vec4; 3]) -> (Vec4, Vec4) {
     const CORNERS: [Vec4; 3] = [
         Vec4::ZERO,
         Vec4::new(1.0, 0.0, 0.0, 1.0),
         Vec4::new(0.0, 1.0, 0.0, 1.0),
     ];
+    let ([w0, w1], [d0, d1]) = (prism.offsets(), prism.range());
     let mut low = Vec4::INFINITY;
     let mut high = Vec4::NEG_INFINITY;
     for (&corner, &normal) in CORNERS.iter().zip(normals) {
-        let (p, q) = (
-            corner + field.offset[0] * normal,
-            corner + field.offset[1] * normal,
-        );
+        let (p, q) = (corner + w0 * normal, corner + w1 * normal);
         low = low.min(p.min(q));
         high = high.max(p.max(q));
     }
-    let [d0, d1] = field.displacement;
+    let lowest = prism.lowest_normal_height();
     (
         low.with_z(d0.min(d0 * lowest)),
         high.with_z(d1.max(d1 * lowest)),

@@ -212,7 +212,7 @@ proptest! {
         let surface = surface(mesh, noise_map(8, Wrap::Repeat), Displacement::new(scale));
         let prisms = Prisms::new(surface.clone(), FINE).unwrap();
         let patch = surface.patch(0);
-        let bent = march::bent::intersect(&patch, &ray, [0.0, scale], Step::Texels(0.02));
+        let bent = march::bent::intersect(&patch, &ray, [-0.001, 1.5 * scale], Step::Texels(0.02));
         let bent = bent.map(|root| root.t);
         let straight = prisms.intersect(0, &ray).map(|hit| f64::from(hit.t));
         prop_assert!(same_or_excused(&prisms, &ray, bent, straight), "{bent:?} {straight:?}");

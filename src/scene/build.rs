@@ -14,16 +14,16 @@ use glam::{Affine3A, Vec3};
 
 use super::error::{AssetError, SceneError};
 use super::file::{
-    BaseColorTable, DisplacementTable, Keyed, LightTable, MaterialTable, MeshTable, SceneFile,
-    SCALE, default_sun,
+    BaseColorTable, DisplacementTable, Keyed, LightTable, MaterialTable, MeshTable, SCALE,
+    SceneFile, default_sun,
 };
 use super::load::{FileDisplacement, FileMaterial, FileTexture, load_mesh};
 use super::{Camera, Color, Film, Light, Material, ObjectShape, Scene, SceneObject, Texture};
 use crate::image::{Channel, ColorSpace};
 use crate::prism::March;
 use crate::surface::{
-    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, UvTransform,
-    Wrap,
+    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Projection,
+    UvTransform, Wrap,
 };
 use assets::Assets;
 
@@ -52,6 +52,8 @@ pub struct Loaded {
 pub struct MeshAndMap {
     /// The mesh file; all its parts are taken.
     pub mesh: PathBuf,
+    /// Texture coordinates instead of the file's.
+    pub texcoords: Option<Projection>,
     /// The displacement map.
     pub map: PathBuf,
     /// Which channel of it.
@@ -91,6 +93,9 @@ impl Loaded {
         let map = builder.assets.heights(map, &source.channel, source.wrap)?;
         let mut file = load_mesh(mesh)?;
         builder.warn_all(mesh, std::mem::take(&mut file.warnings));
+        if let Some(projection) = source.texcoords {
+            file.project(projection);
+        }
         let name = stem(mesh);
         let whole = file.into_single_mesh();
         let whole = builder.base_mesh(mesh, &name, whole, &Shaping::default())?;
@@ -147,7 +152,10 @@ impl Builder {
             recompute_normals: table.recompute_normals,
             crease_angle: table.crease_angle,
         };
-        let loaded = load_mesh(path).map_err(|e| asset(e.into()))?;
+        let mut loaded = load_mesh(path).map_err(|e| asset(e.into()))?;
+        if let Some(projection) = table.texcoords {
+            loaded.project(projection);
+        }
         self.warn_all(path, loaded.warnings);
         let single = loaded.parts.len() == 1;
         let mut of_file = HashMap::new();
@@ -214,7 +222,10 @@ impl Builder {
             })?;
         if report.degenerate_dropped > 0 {
             let dropped = report.degenerate_dropped;
-            self.warn(path, format!("{name}: {dropped} faces without area were left out"));
+            self.warn(
+                path,
+                format!("{name}: {dropped} faces without area were left out"),
+            );
         }
         Ok(Arc::new(mesh))
     }
@@ -238,7 +249,7 @@ impl Builder {
             }
         };
         let Some(scale) = table.scale.or(by_file.and_then(|f| f.scale)) else {
-            return Err(table.this.refuse("no scale", SCALE));
+            return Err(table.this.refuse("no scale", format!("scale = {SCALE}")));
         };
         let channel = match (&table.channel, by_file.and_then(|f| f.channel)) {
             (Some(channel), _) => channel.clone(),
@@ -282,9 +293,11 @@ impl Builder {
     /// Adds a material that a mesh file gives.
     fn file_material(&mut self, path: &Path, file: FileMaterial) -> Result<usize, AssetError> {
         let image = match &file.base_color_texture {
-            Some(FileTexture::Path(picture)) => {
-                Some(self.assets.color(picture, ColorSpace::Srgb, file.base_color)?)
-            }
+            Some(FileTexture::Path(picture)) => Some(self.assets.color(
+                picture,
+                ColorSpace::Srgb,
+                file.base_color,
+            )?),
             Some(FileTexture::Embedded(bytes)) => {
                 Some(assets::embedded_color(path, bytes, file.base_color)?)
             }

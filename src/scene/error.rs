@@ -42,9 +42,7 @@ impl Place {
             file: file.to_owned(),
             line: before.matches('\n').count() + 1,
             column: column + 1,
-            text: text
-                .map(|c| if c.is_control() { ' ' } else { c })
-                .collect(),
+            text: text.map(|c| if c.is_control() { ' ' } else { c }).collect(),
             caret: column - skip,
         }
     }

@@ -214,7 +214,7 @@ impl MeshBuilder {
         self.triangles.extend(shifted);
     }
 
-    fn validate(&self) -> Result<(), MeshError> {
+    pub(super) fn validate(&self) -> Result<(), MeshError> {
         let vertices = self.positions.len();
         let sizes = [
             ("vertices", vertices, u32::MAX as usize),
@@ -378,6 +378,12 @@ impl BaseMesh {
     /// Vertex indices.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
+    }
+
+    /// The first corner of one triangle.
+    #[inline]
+    pub fn first_corner(&self, triangle: u32) -> Vec3 {
+        self.positions[self.triangles[triangle as usize][0] as usize]
     }
 
     /// The corners of one triangle.

@@ -133,19 +133,18 @@ fn cluster_normals(
     let roots: Vec<usize> = (0..sums.len())
         .map(|corner| clusters.root(corner))
         .collect();
-    roots
-        .iter()
-        .enumerate()
-        .map(|(corner, &root)| {
-            let (sum, weights) = sums[root];
-            if sum.length() > CANCELLED * weights {
-                unit(sum)
-            } else {
-                clusters.parent[corner] = corner;
-                unit(faces[corner / 3])
-            }
-        })
-        .collect()
+    let mut normals = Vec::with_capacity(roots.len());
+    for (corner, &root) in roots.iter().enumerate() {
+        let (sum, weights) = sums[root];
+        if sum.length() > CANCELLED * weights {
+            normals.push(unit(sum));
+        } else {
+            // Every corner of the cluster comes here, so none is left pointing at another.
+            clusters.parent[corner] = corner;
+            normals.push(unit(faces[corner / 3]));
+        }
+    }
+    normals
 }
 
 /// Gives each (vertex, cluster) pair a vertex of its own; the first cluster keeps the old index.
@@ -255,7 +254,6 @@ mod tests {
         for (i, corner) in triangles.as_flattened_mut().iter_mut().enumerate() {
             *corner = i as u32;
         }
-        positions[0].x += 0.0;
         let smooth = smooth(&positions, &triangles, PI);
         let bits = |v: Vec3| v.to_array().map(f32::to_bits);
         for (i, p) in positions.iter().enumerate() {

@@ -62,6 +62,13 @@ impl Patch<'_> {
         (b - a).cross(c - a).normalize()
     }
 
+    /// Smallest and largest D over the triangle, conservative.
+    pub fn range(&self) -> [f64; 2] {
+        let (low, high) = self.map.range_over(self.texels);
+        let [a, b] = [low, high].map(|h| self.scale * (f64::from(h) - self.midlevel));
+        [a.min(b), a.max(b)]
+    }
+
     /// |N'(b)| at its smallest over the triangle, from below: |N'|^2 = 1 - sum b_i b_j |n_i - n_j|^2 and the sum
     /// of the b_i b_j is at most 1/3. Never less than [`Self::LEAST_NORMAL`].
     pub fn shortest_normal(&self) -> f64 {
@@ -73,12 +80,6 @@ impl Patch<'_> {
         (1.0 - spread / 3.0)
             .max(Self::LEAST_NORMAL * Self::LEAST_NORMAL)
             .sqrt()
-    }
-
-    /// The range of w = D / |N'| for D in `range`.
-    pub fn offsets(&self, [low, high]: [f64; 2]) -> [f64; 2] {
-        let shortest = self.shortest_normal();
-        [low.min(low / shortest), high.max(high / shortest)]
     }
 
     /// Where opposed normals cancel to less than this, the surface is cut off.

@@ -31,6 +31,20 @@ impl Wrap {
         }
     }
 
+    /// Folds texel `i` of a side of `n` texels into the stored map, [0, n).
+    pub fn texel(self, i: i64, n: usize) -> usize {
+        let n = n as i64;
+        let folded = match self {
+            Self::Repeat => i.rem_euclid(n),
+            Self::Clamp => i.clamp(0, n - 1),
+            Self::Mirror => {
+                let i = i.rem_euclid(2 * n);
+                i.min(2 * n - 1 - i)
+            }
+        };
+        folded as usize
+    }
+
     /// The largest multiple of the map's period in whole maps at or below `s`: what may be subtracted from a
     /// texture coordinate without changing what is sampled.
     pub fn whole_periods(self, s: f64) -> f64 {

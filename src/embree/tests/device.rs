@@ -3,21 +3,16 @@ use std::sync::Arc;
 use super::*;
 use crate::embree::{EmbreeError, ErrorCode, version};
 
-fn refused(config: &str) -> EmbreeError {
-    let options = DeviceOptions {
-        config: config.to_string(),
-        ..DeviceOptions::default()
-    };
-    Device::new(&options).unwrap_err()
-}
-
 #[test]
-fn an_unreadable_configuration_is_an_invalid_argument() {
+fn an_unreadable_configuration_is_an_error_that_names_it() {
     for config in ["threads=many", "threads=2\0"] {
-        let EmbreeError::Library { code, message } = refused(config) else {
-            panic!("{config}");
+        let options = DeviceOptions {
+            config: config.to_string(),
+            ..DeviceOptions::default()
         };
-        assert_eq!(code, ErrorCode::InvalidArgument, "{config}: {message}");
+        let error = Device::new(&options).unwrap_err();
+        assert!(matches!(error, EmbreeError::Library { .. }), "{error}");
+        assert!(error.to_string().contains("configuration"), "{error}");
     }
 }
 

@@ -6,6 +6,8 @@ mod faults;
 mod filter;
 mod instance;
 mod scene;
+mod tracer;
+mod triangles;
 mod user;
 
 use std::sync::Arc;

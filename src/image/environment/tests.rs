@@ -30,7 +30,7 @@ fn the_first_row_is_the_top() {
 #[test]
 fn bad_radiance_is_refused_with_its_place() {
     let folder = Folder::new();
-    for bad in [f32::NAN, f32::INFINITY, -0.001] {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let pixels = [
             [1.0; 3],
             [1.0; 3],
@@ -45,6 +45,13 @@ fn bad_radiance_is_refused_with_its_place() {
             "{error}"
         );
     }
+}
+
+#[test]
+fn ringing_below_zero_is_no_light() {
+    let folder = Folder::new();
+    let sky = load_environment(&exr(&folder, &[[-5.0, 2.0, 0.0], [1.0; 3]])).unwrap();
+    assert_eq!(sky.pixels, [Vec3::new(0.0, 2.0, 0.0), Vec3::ONE]);
 }
 
 #[test]

@@ -18,12 +18,10 @@ use crate::surface::Patch;
 const PIECES: usize = 16;
 const MOST_HALVINGS: u32 = 12;
 
-/// The nearest hit over one base triangle, displaced within `range`.
-pub fn intersect(patch: &Patch<'_>, ray: &Ray, range: [f32; 2], step: Step) -> Option<Root> {
+/// The nearest hit over one base triangle, for w within `offsets`.
+pub fn intersect(patch: &Patch<'_>, ray: &Ray, offsets: [f32; 2], step: Step) -> Option<Root> {
     let curve = Curve::new(patch, ray, step);
-    let range = range.map(f64::from);
-    let slack = 1e-6 * range[0].abs().max(range[1].abs());
-    let [low, high] = patch.offsets([range[0] - slack, range[1] + slack]);
+    let [low, high] = offsets.map(f64::from);
     let mut nearest = None;
     for [from, to] in curve.inside(low, high) {
         let mut before = curve.sample(from);

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::Step;
 use super::polish::Crossing;
-use crate::prism::path::{HeightField, Path};
+use crate::prism::path::{HeightUnits, Path};
 use crate::prism::simd::{Grid, LANES, Lanes};
 
 /// No march takes more steps in one prism than this, however small the step.
@@ -20,7 +20,7 @@ pub struct Field<'a> {
     /// The ray's path.
     pub path: &'a Path,
     /// Units of height.
-    pub heights: &'a HeightField,
+    pub heights: &'a HeightUnits,
     /// The map.
     pub grid: &'a Grid<'a>,
     /// |n_i - n_j|^2, see [`Path::above`].
@@ -35,6 +35,8 @@ pub struct Stepping {
     pub speed: f32,
     /// R, in (0, 1].
     pub first: f32,
+    /// No sample is needed well beyond this parameter of the path.
+    pub limit: f32,
 }
 
 /// Heights above the surface at eight parameters.
@@ -64,7 +66,10 @@ impl Field<'_> {
         };
         let mut before: Option<(f32, bool)> = None;
         let mut k = 0.0;
-        while k <= last {
+        // Polishing may end up to a step before the bracket.
+        let wanted =
+            |before: Option<(f32, bool)>| before.is_none_or(|(s, _)| s - step <= stepping.limit);
+        while k <= last && wanted(before) {
             let s = (lane_numbers::<L>() + L::splat(k - 1.0 + stepping.first))
                 .mul_add(L::splat(step), L::splat(from))
                 .max(L::splat(from))

@@ -108,24 +108,24 @@ impl Lanes for Avx2 {
             let above = _mm256_add_epi32(index, stride);
             match grid.texels {
                 Texels::U8(t) => {
-                    let load = |index| _mm256_i32gather_epi32::<1>(t.as_ptr().cast(), index);
-                    let ([a, b], [c, d]) = (pair::<8>(load(index)), pair::<8>(load(above)));
-                    [a, b, c, d]
+                    let texels = t.as_ptr().cast();
+                    let (h00, h10) = pair::<8>(_mm256_i32gather_epi32::<1>(texels, index));
+                    let (h01, h11) = pair::<8>(_mm256_i32gather_epi32::<1>(texels, above));
+                    [h00, h10, h01, h11]
                 }
                 Texels::U16(t) => {
-                    let load = |index| _mm256_i32gather_epi32::<2>(t.as_ptr().cast(), index);
-                    let ([a, b], [c, d]) = (pair::<16>(load(index)), pair::<16>(load(above)));
-                    [a, b, c, d]
+                    let texels = t.as_ptr().cast();
+                    let (h00, h10) = pair::<16>(_mm256_i32gather_epi32::<2>(texels, index));
+                    let (h01, h11) = pair::<16>(_mm256_i32gather_epi32::<2>(texels, above));
+                    [h00, h10, h01, h11]
                 }
                 Texels::F32(t) => {
-                    let load = |index, offset| {
-                        Self(_mm256_i32gather_ps::<4>(t.as_ptr().add(offset), index))
-                    };
+                    let (left, right) = (t.as_ptr(), t.as_ptr().add(1));
                     [
-                        load(index, 0),
-                        load(index, 1),
-                        load(above, 0),
-                        load(above, 1),
+                        Self(_mm256_i32gather_ps::<4>(left, index)),
+                        Self(_mm256_i32gather_ps::<4>(right, index)),
+                        Self(_mm256_i32gather_ps::<4>(left, above)),
+                        Self(_mm256_i32gather_ps::<4>(right, above)),
                     ]
                 }
             }
@@ -139,11 +139,15 @@ impl Lanes for Avx2 {
 ///
 /// Needs AVX2.
 #[inline(always)]
-unsafe fn pair<const BITS: i32>(words: __m256i) -> [Avx2; 2] {
+unsafe fn pair<const BITS: i32>(words: __m256i) -> (Avx2, Avx2) {
     // SAFETY: the caller has AVX2.
     unsafe {
         let mask = _mm256_set1_epi32((1 << BITS) - 1);
+        let first = _mm256_and_si256(words, mask);
         let second = _mm256_and_si256(_mm256_srli_epi32::<BITS>(words), mask);
-        [_mm256_and_si256(words, mask), second].map(|x| Avx2(_mm256_cvtepi32_ps(x)))
+        (
+            Avx2(_mm256_cvtepi32_ps(first)),
+            Avx2(_mm256_cvtepi32_ps(second)),
+        )
     }
 }

@@ -1,45 +1,49 @@
-//! Eight lanes in plain Rust; the compiler turns them into the baseline's vectors (SSE2, NEON).
+//! Eight lanes as two of glam's four: SSE2, NEON or plain Rust, whatever the architecture always has.
 
-use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Sub};
+
+use glam::Vec4;
 
 use super::{Grid, LANES, Lanes};
 use crate::surface::Texels;
 
 #[derive(Clone, Copy)]
-pub struct Portable([f32; LANES]);
+pub struct Portable(Vec4, Vec4);
 
 macro_rules! lanewise {
-    ($operator:ident, $method:ident, $op:tt) => {
+    ($operator:ident, $method:ident) => {
         impl $operator for Portable {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Self(from_fn(|l| self.0[l] $op other.0[l]))
+                Self(self.0.$method(other.0), self.1.$method(other.1))
             }
         }
     };
 }
 
-lanewise!(Add, add, +);
-lanewise!(Sub, sub, -);
-lanewise!(Mul, mul, *);
-lanewise!(Div, div, /);
+lanewise!(Add, add);
+lanewise!(Sub, sub);
+lanewise!(Mul, mul);
+lanewise!(Div, div);
 
 impl Lanes for Portable {
     #[inline(always)]
     fn splat(x: f32) -> Self {
-        Self([x; LANES])
+        Self(Vec4::splat(x), Vec4::splat(x))
     }
 
     #[inline(always)]
     fn from_array(x: [f32; LANES]) -> Self {
-        Self(x)
+        Self(Vec4::from_slice(&x[..4]), Vec4::from_slice(&x[4..]))
     }
 
     #[inline(always)]
     fn to_array(self) -> [f32; LANES] {
-        self.0
+        let mut out = [0.0; LANES];
+        self.0.write_to_slice(&mut out[..4]);
+        self.1.write_to_slice(&mut out[4..]);
+        out
     }
 
     #[inline(always)]
@@ -49,44 +53,27 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        Self(from_fn(|l| {
-            if self.0[l] < other.0[l] {
-                self.0[l]
-            } else {
-                other.0[l]
-            }
-        }))
+        Self(self.0.min(other.0), self.1.min(other.1))
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        Self(from_fn(|l| {
-            if self.0[l] > other.0[l] {
-                self.0[l]
-            } else {
-                other.0[l]
-            }
-        }))
+        Self(self.0.max(other.0), self.1.max(other.1))
     }
 
     #[inline(always)]
     fn floor(self) -> Self {
-        // f32::floor is a library call without SSE4.1. Beyond 2^23 every f32 is an integer already.
-        Self(self.0.map(|x| {
-            let whole = x as i32 as f32;
-            let down = if whole > x { whole - 1.0 } else { whole };
-            if x.abs() < 8_388_608.0 { down } else { x }
-        }))
+        Self(self.0.floor(), self.1.floor())
     }
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(self.0.map(f32::sqrt))
+        Self(self.0.sqrt(), self.1.sqrt())
     }
 
     #[inline(always)]
     fn sign_mask(self) -> u32 {
-        (0..LANES).fold(0, |mask, l| mask | (self.0[l].to_bits() >> 31) << l)
+        self.0.is_negative_bitmask() | self.1.is_negative_bitmask() << 4
     }
 
     #[inline(always)]
@@ -107,17 +94,26 @@ fn corners<T: Copy + Into<f32>>(
     j: Portable,
 ) -> [Portable; 4] {
     let [width, height] = grid.size;
+    let (i, j) = (i.to_array(), j.to_array());
     let mut out = [[0.0; LANES]; 4];
     for l in 0..LANES {
         // `as usize` turns NaN and negatives into 0.
         let (i, j) = (
-            i.0[l].min(width - 1.0) as usize,
-            j.0[l].min(height - 1.0) as usize,
+            i[l].min(width - 1.0) as usize,
+            j[l].min(height - 1.0) as usize,
         );
         let at = j * grid.stride + i;
-        for (corner, offset) in [0, 1, grid.stride, grid.stride + 1].into_iter().enumerate() {
-            out[corner][l] = t[at + offset].into();
-        }
+        // One bounds check for the pair.
+        let (bottom, top) = (&t[at..at + 2], &t[at + grid.stride..at + grid.stride + 2]);
+        out[0][l] = bottom[0].into();
+        out[1][l] = bottom[1].into();
+        out[2][l] = top[0].into();
+        out[3][l] = top[1].into();
     }
-    out.map(Portable)
+    [
+        Portable::from_array(out[0]),
+        Portable::from_array(out[1]),
+        Portable::from_array(out[2]),
+        Portable::from_array(out[3]),
+    ]
 }

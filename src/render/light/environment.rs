@@ -1,6 +1,6 @@
 //! A measured or painted surrounding: an equirectangular HDR picture, sampled by its brightness.
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -73,10 +73,10 @@ fn bilinear(image: &EnvironmentImage, at: Vec2) -> Vec3 {
 impl InfiniteLight for Environment {
     fn radiance(&self, direction: Vec3) -> Vec3 {
         let local = self.to_picture(direction);
-        let azimuth = local.x.atan2(-local.z) / TAU + 0.5;
-        let polar = local.y.clamp(-1.0, 1.0).acos() / PI;
+        let point = latlong::point(local);
+        let polar = point.y.acos() / PI;
         let size = Vec2::new(self.image.width as f32, self.image.height as f32);
-        self.strength * bilinear(&self.image, Vec2::new(azimuth, polar) * size)
+        self.strength * bilinear(&self.image, Vec2::new(point.x, polar) * size)
     }
 
     fn sample(&self, _normal: Vec3, u: Vec2) -> LightSample {
@@ -166,7 +166,7 @@ mod tests {
         // The bilinear bump of one pixel integrates to the pixel's solid angle (up to the change of
         // sin(theta) over its three rows).
         let border = |row: usize| (PI * row as f32 / 32.0).cos();
-        let expected = 1000.0 * TAU / 64.0 * (border(9) - border(10));
+        let expected = 1000.0 * 2.0 * PI / 64.0 * (border(9) - border(10));
         assert!((power / expected - 1.0).abs() < 0.02, "{power} {expected}");
     }
 }

@@ -30,7 +30,9 @@ impl Assets {
         wrap: Wrap,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
         let key = (identity(path), channel.clone(), wrap);
-        once(&mut self.heights, key, || image::load_heights(path, channel, wrap))
+        once(&mut self.heights, key, || {
+            image::load_heights(path, channel, wrap)
+        })
     }
 
     /// A colour picture, times `tint`.

@@ -1,0 +1,184 @@
+use std::fs;
+use std::sync::Arc;
+
+use tempfile::TempDir;
+
+use super::*;
+use crate::image::{write_png_gray16, write_png_rgb8};
+
+/// Two squares of two materials, the first displaced and coloured by its MTL.
+const OBJ: &str = "\
+mtllib two.mtl
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0
+vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
+usemtl rough
+f 1/1 2/2 3/3\nf 1/1 3/3 4/4
+usemtl smooth
+f 1/1 3/3 2/2
+";
+const MTL: &str = "newmtl rough\nKd 1 1 1\nmap_Kd color.png\ndisp height.png\nnewmtl smooth\nKd 0.25 0.5 0.75\ndisp height.png\n";
+
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("two.obj"), OBJ).unwrap();
+    fs::write(path("two.mtl"), MTL).unwrap();
+    write_png_gray16(&path("height.png"), 2, 2, &[0, 65535, 65535, 0]).unwrap();
+    write_png_rgb8(&path("color.png"), 1, 1, &[[255, 0, 0]]).unwrap();
+    folder
+}
+
+fn load(folder: &TempDir, scene: &str) -> Result<Loaded, SceneError> {
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, scene).unwrap();
+    Loaded::from_file(&path)
+}
+
+fn surface(object: &SceneObject) -> &DisplacedSurface {
+    match &object.shape {
+        ObjectShape::Displaced(surface, _) => surface,
+        ObjectShape::Plain(_) => panic!("{} is not displaced", object.name),
+    }
+}
+
+#[test]
+fn parts_become_objects_with_the_materials_and_maps_of_their_file() {
+    let loaded = load(
+        &folder(),
+        "[[mesh]]\nfile = \"two.obj\"\n[mesh.displacement]\nscale = 0.5\n",
+    )
+    .unwrap();
+    let scene = &loaded.scene;
+    assert_eq!(scene.objects.len(), 2);
+    assert!(scene.objects.iter().all(|o| o.name.starts_with("two.")));
+    let [first, second] = [0, 1].map(|i| surface(&scene.objects[i]));
+    assert!(Arc::ptr_eq(first.map(), second.map()));
+    assert_eq!(loaded.maps.len(), 1);
+    assert_eq!(first.range(), (0.0, 0.5));
+    let material = |object: usize| &scene.materials[scene.objects[object].material];
+    assert!(matches!(material(0).base_color, Color::Texture(_)));
+    match material(1).base_color {
+        Color::Constant(c) => assert_eq!(c, Vec3::new(0.25, 0.5, 0.75)),
+        Color::Texture(_) => panic!("smooth has no texture"),
+    }
+}
+
+#[test]
+fn a_named_material_and_a_named_map_win() {
+    let scene = "[[mesh]]\nfile = \"two.obj\"\nmaterial = \"red\"\n[mesh.displacement]\nscale = -1\nmidlevel = 0.5\nmap = \"../x/../height.png\"\n[[material]]\nname = \"red\"\nbase_color = { file = \"color.png\" }\n";
+    let folder = folder();
+    let scene = scene.replace("../x/../", "./");
+    let loaded = load(&folder, &scene).unwrap();
+    assert!(loaded.scene.objects.iter().all(|o| o.material == 0));
+    assert_eq!(surface(&loaded.scene.objects[0]).range(), (-0.5, 0.5));
+}
+
+#[test]
+fn meshes_are_moved_before_they_are_displaced() {
+    let scene = "[[mesh]]\nfile = \"two.obj\"\ntransform = { scale = 10, translate = [5, 0, 0] }\n[mesh.displacement]\nscale = 0.5\n";
+    let loaded = load(&folder(), scene).unwrap();
+    let surface = surface(&loaded.scene.objects[0]);
+    let bounds = surface.mesh().bounds();
+    assert_eq!(
+        (bounds.min, bounds.max),
+        (Vec3::new(5.0, 0.0, 0.0), Vec3::new(15.0, 10.0, 0.0))
+    );
+    assert_eq!(surface.range(), (0.0, 0.5));
+}
+
+#[test]
+fn the_default_camera_sees_every_corner() {
+    let scene = "[[mesh]]\nfile = \"two.obj\"\ninstances = [ {}, { translate = [7, -3, 2], rotate = [10, 20, 30] } ]\n";
+    let loaded = load(&folder(), scene).unwrap();
+    let camera = loaded.scene.camera;
+    let view = (camera.target - camera.position).normalize();
+    for object in &loaded.scene.objects {
+        let ObjectShape::Plain(mesh) = &object.shape else {
+            panic!("no displacement was asked for");
+        };
+        for transform in &object.instances {
+            for &p in mesh.positions() {
+                let to = transform.transform_point3(p) - camera.position;
+                let angle = to.angle_between(view);
+                assert!(angle < 0.5 * camera.fov, "{p} at {angle}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_camera_must_look_somewhere() {
+    let mesh = "[[mesh]]\nfile = \"two.obj\"\n";
+    let same = load(
+        &folder(),
+        &format!("[camera]\nposition = [1, 2, 3]\ntarget = [1, 2, 3]\n{mesh}"),
+    );
+    assert!(
+        same.unwrap_err()
+            .to_string()
+            .contains("two different points")
+    );
+    let upright = load(
+        &folder(),
+        &format!("[camera]\nposition = [0, 9, 0]\ntarget = [0, 0, 0]\n{mesh}"),
+    );
+    assert!(upright.unwrap_err().to_string().contains("camera.up"));
+}
+
+#[test]
+fn a_scene_without_lights_has_sun_and_sky() {
+    let loaded = load(&folder(), "[[mesh]]\nfile = \"two.obj\"\n").unwrap();
+    assert!(matches!(
+        loaded.scene.lights[..],
+        [Light::Sun { .. }, Light::Sky { .. }]
+    ));
+}
+
+#[test]
+fn a_sky_stands_around_the_sun_of_the_file() {
+    let scene = "[[light]]\ntype = \"sky\"\n[[light]]\ntype = \"sun\"\nelevation = 90\n[[mesh]]\nfile = \"two.obj\"\n";
+    let loaded = load(&folder(), scene).unwrap();
+    match loaded.scene.lights[0] {
+        Light::Sky { sun_direction, .. } => assert!((sun_direction - Vec3::Y).length() < 1e-6),
+        _ => panic!("the sky stands first"),
+    }
+}
+
+#[test]
+fn the_world_keeps_the_order_of_objects() {
+    let scene = "[[mesh]]\nfile = \"two.obj\"\nmask = 5\n[mesh.displacement]\nscale = 0.5\n[[mesh]]\nfile = \"two.obj\"\ninstances = [ {}, {} ]\n";
+    let world = load(&folder(), scene).unwrap().scene.world().unwrap();
+    let masks: Vec<_> = world.objects().iter().map(|o| o.mask).collect();
+    assert_eq!(masks, [5, 5, u32::MAX, u32::MAX]);
+    assert_eq!(world.top_level().len(), 2 + 4);
+}
+
+#[test]
+fn texture_coordinates_are_made_on_demand() {
+    let folder = folder();
+    let bare: String = OBJ
+        .lines()
+        .filter(|line| !line.starts_with("vt"))
+        .map(|line| line.replace("/1", "").replace("/2", "") + "\n")
+        .collect();
+    let bare = bare.replace("/3", "").replace("/4", "");
+    fs::write(folder.path().join("two.obj"), bare).unwrap();
+    let scene = |texcoords: &str| {
+        format!(
+            "[[mesh]]\nfile = \"two.obj\"\ntransform = {{ scale = 4 }}\n{texcoords}\n[mesh.displacement]\nscale = 1\n"
+        )
+    };
+    let missing = load(&folder, &scene("")).unwrap_err().to_string();
+    for known in ["box", "spherical", "cylindrical", "planar", "--texcoords"] {
+        assert!(missing.contains(known), "{missing}");
+    }
+    let unknown = load(&folder, &scene("texcoords = \"cubic\"")).unwrap_err();
+    assert!(unknown.to_string().contains("planar"), "{unknown}");
+    let loaded = load(&folder, &scene("texcoords = \"planar\"")).unwrap();
+    for object in &loaded.scene.objects {
+        let mesh = surface(object).mesh();
+        for (p, st) in mesh.positions().iter().zip(mesh.texcoords()) {
+            assert_eq!(*st, p.truncate() / 4.0);
+        }
+    }
+}

@@ -9,8 +9,8 @@ mod view;
 
 use std::path::{Path, PathBuf};
 
-use super::error::{AssetError, Place, SceneError};
 use super::Film;
+use super::error::{AssetError, Place, SceneError};
 pub(super) use mesh::{DisplacementTable, MeshTable, SCALE};
 use reader::{Item, Section, Source};
 pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, default_sun};
@@ -99,7 +99,10 @@ impl SceneFile {
         }
         for (index, material) in self.materials.iter().enumerate() {
             let name = &material.name;
-            if self.materials[..index].iter().any(|m| m.name.value == name.value) {
+            if self.materials[..index]
+                .iter()
+                .any(|m| m.name.value == name.value)
+            {
                 let found = format!("{:?} for a second time", name.value);
                 return Err(name.refuse(found, "a name of its own for every [[material]]"));
             }

@@ -185,9 +185,9 @@ impl<'a> Item<'a> {
             DeValue::String(s) => words.iter().find(|(word, _)| word == s),
             _ => None,
         };
-        found.map(|&(_, meaning)| meaning).ok_or_else(|| {
-            self.refuse(one_of(words.iter().map(|(word, _)| *word)))
-        })
+        found
+            .map(|&(_, meaning)| meaning)
+            .ok_or_else(|| self.refuse(one_of(words.iter().map(|(word, _)| *word))))
     }
 
     /// `[x, y, z]`, each number finite and `fits`.

@@ -1,0 +1,155 @@
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+
+use super::*;
+use crate::prism::{March, Step};
+use crate::surface::Wrap;
+
+fn parse(text: &str) -> Result<SceneFile, SceneError> {
+    SceneFile::parse(Path::new("folder/scene.toml"), text)
+}
+
+fn refusal(text: &str) -> String {
+    parse(text).unwrap_err().to_string()
+}
+
+/// The TOML blocks of the reference.
+fn documented() -> Vec<&'static str> {
+    let page = include_str!("../../../docs/scene.md");
+    let blocks = page.split("```toml\n").skip(1);
+    blocks
+        .map(|block| block.split("```").next().unwrap())
+        .collect()
+}
+
+#[test]
+fn the_documented_scenes_are_scenes() {
+    for block in documented() {
+        parse(block).unwrap_or_else(|e| panic!("{e}"));
+    }
+}
+
+#[test]
+fn the_documented_defaults_are_the_defaults() {
+    let bare =
+        parse("[[mesh]]\nfile = \"a.obj\"\n[mesh.displacement]\n[[material]]\nname = \"m\"\n")
+            .unwrap();
+    assert_eq!(bare.film, Film::default());
+    assert_eq!(
+        (bare.film.width, bare.film.height, bare.film.spp),
+        (640, 480, 16)
+    );
+    assert_eq!(bare.camera.fov, 40f32.to_radians());
+    let mesh = &bare.meshes[0];
+    assert_eq!(mesh.file.value, Path::new("folder/a.obj"));
+    assert_eq!((mesh.mask, mesh.instances.len()), (u32::MAX, 0));
+    let displacement = mesh.displacement.as_ref().unwrap();
+    let march = March::Uniform {
+        step: Step::Texels(1.0),
+        jitter: false,
+    };
+    assert_eq!(displacement.march, march);
+    let material = &bare.materials[0];
+    assert_eq!(
+        (material.metallic, material.roughness, material.specular),
+        (0.0, 1.0, 0.5)
+    );
+}
+
+#[test]
+fn every_value_arrives() {
+    let file = parse(documented()[1]).unwrap();
+    let mesh = &file.meshes[0];
+    assert_eq!(mesh.instances.len(), 2);
+    // A quarter turn about y takes +z to +x.
+    let turned = mesh.instances[1].transform_point3(Vec3::Z);
+    assert!(
+        (turned - Vec3::new(3.0, 0.0, 0.0)).length() < 1e-6,
+        "{turned}"
+    );
+    let displacement = mesh.displacement.as_ref().unwrap();
+    assert_eq!(displacement.scale, Some(0.2));
+    assert_eq!(displacement.wrap, Some(Wrap::Repeat));
+    let BaseColorTable::Texture(texture) = &file.materials[1].base_color else {
+        panic!("a texture was written");
+    };
+    assert_eq!(texture.uv.scale, Vec2::splat(2.0));
+    let LightTable::Sun { direction, .. } = file.lights[0] else {
+        panic!("a sun was written");
+    };
+    assert!((direction.y - 35f32.to_radians().sin()).abs() < 1e-6);
+    assert!((direction.length() - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn rotations_go_about_x_then_y_then_z() {
+    let text = "[[mesh]]\nfile = \"a.obj\"\ntransform = { rotate = [90, 90, 0], scale = [1, 2, 3], translate = [0, 0, 7] }";
+    let transform = parse(text).unwrap().meshes[0].transform;
+    // Scaled to 2 y, which a quarter about x turns to 2 z, and a quarter about y to 2 x.
+    let found = transform.transform_point3(Vec3::Y);
+    assert!(
+        (found - Vec3::new(2.0, 0.0, 7.0)).length() < 1e-6,
+        "{found}"
+    );
+}
+
+#[test]
+fn messages_show_place_key_and_line() {
+    let message = refusal("[[mesh]]\nfile = \"a.obj\"\n  mask = -1 # all\n");
+    let shown = "folder/scene.toml:3:10: mesh[0].mask: found -1; expected a whole number from 0 to 4294967295";
+    assert!(message.starts_with(shown), "{message}");
+    assert!(
+        message.ends_with("\n   |\n 3 |   mask = -1 # all\n   |          ^"),
+        "{message}"
+    );
+}
+
+#[test]
+fn messages_stay_on_one_screen() {
+    let long = format!(
+        "[[mesh]]\nfile = \"{}\"\nmask = {:?}",
+        "x".repeat(10_000),
+        "y".repeat(10_000)
+    );
+    assert!(
+        refusal(&long)
+            .lines()
+            .all(|line| line.chars().count() < 250)
+    );
+    let column = format!("{}[[mesh", " ".repeat(5_000));
+    assert!(
+        refusal(&column)
+            .lines()
+            .all(|line| line.chars().count() < 250)
+    );
+}
+
+#[test]
+fn odd_texts_are_refused_with_a_place() {
+    for text in [
+        "[",
+        "a = \"\u{e4}",
+        "\u{fffd}\0",
+        "mesh = 3",
+        "mesh = [1]",
+        "film = 1",
+        "[[film]]",
+        "mesh = []",
+        "\r\n\r",
+    ] {
+        let message = refusal(text);
+        assert!(
+            message.starts_with("folder/scene.toml:"),
+            "{text:?}: {message}"
+        );
+    }
+}
+
+#[test]
+fn names_of_materials_are_unique() {
+    let message = refusal(
+        "[[mesh]]\nfile = \"a.obj\"\n[[material]]\nname = \"m\"\n[[material]]\nname = \"m\"\n",
+    );
+    assert!(message.contains("material[1].name"), "{message}");
+}

@@ -5,6 +5,7 @@
 //! one part whose triangle k is the file's face k. Polygons are cut into fans from their first corner.
 //! Texture coordinates come out with v up, whatever the format's habit.
 
+mod draco;
 mod gltf;
 mod mtl;
 mod obj;
@@ -16,7 +17,8 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use thiserror::Error;
 
-use crate::surface::{MeshBuilder, UvTransform, Wrap};
+use crate::ray::Aabb;
+use crate::surface::{MeshBuilder, Projection, UvTransform, Wrap};
 
 /// Endings of the files that [`load_mesh`] reads.
 pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
@@ -27,8 +29,7 @@ pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
 pub struct LoadMeshError {
     /// The file that was asked for.
     pub path: PathBuf,
-    /// What is wrong with it.
-    #[source]
+    /// What is wrong with it; part of the message.
     pub kind: LoadMeshErrorKind,
 }
 
@@ -178,6 +179,20 @@ pub fn load_mesh(path: &Path) -> Result<LoadedFile, LoadMeshError> {
 }
 
 impl LoadedFile {
+    /// Replaces all texture coordinates by those of a projection around the whole file.
+    pub fn project(&mut self, projection: Projection) {
+        let corners = |mesh: &MeshBuilder| {
+            let indices = mesh.triangles.as_flattened().iter();
+            let positions = indices.filter_map(|&i| mesh.positions.get(i as usize));
+            positions.fold(Aabb::EMPTY, |b, &p| b.including(p))
+        };
+        let parts = self.parts.iter().map(|part| corners(&part.mesh));
+        let bounds = parts.fold(Aabb::EMPTY, Aabb::union);
+        for part in &mut self.parts {
+            part.mesh.project(projection, bounds);
+        }
+    }
+
     /// All parts as one mesh, part after part; the materials are dropped.
     pub fn into_single_mesh(self) -> MeshBuilder {
         let mut whole = MeshBuilder::default();
@@ -196,7 +211,7 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     if !MESH_EXTENSIONS.contains(&extension.as_str()) {
         return Err(LoadMeshErrorKind::UnknownExtension { found: extension });
     }
-    let bytes = std::fs::read(path).map_err(|source| LoadMeshErrorKind::Read {
+    let bytes = read_regular(path).map_err(|source| LoadMeshErrorKind::Read {
         what: "the file".into(),
         source,
     })?;
@@ -216,6 +231,14 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
         part.name = stem.clone().into_owned();
     }
     Ok(file)
+}
+
+/// The bytes of a regular file: a mesh file that names a device must not make us read for ever.
+fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("not a regular file"));
+    }
+    std::fs::read(path)
 }
 
 /// Sorts meshes into parts by material and by whether they have texture coordinates.
@@ -301,6 +324,11 @@ mod tests {
     fn missing_and_empty_files_are_refused() {
         let missing = load_mesh(Path::new("no/such/mesh.obj")).unwrap_err();
         assert!(matches!(missing.kind, LoadMeshErrorKind::Read { .. }));
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("mesh.obj");
+        std::fs::create_dir(&folder).unwrap();
+        let refused = load_mesh(&folder).unwrap_err();
+        assert!(matches!(refused.kind, LoadMeshErrorKind::Read { .. }));
         for known in MESH_EXTENSIONS {
             let empty = load_bytes(&format!("mesh.{known}"), b"").unwrap_err();
             assert!(matches!(empty.kind, LoadMeshErrorKind::Empty));
@@ -311,6 +339,19 @@ mod tests {
     fn the_ending_may_be_in_capitals() {
         let file = load_bytes("MESH.OBJ", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
         assert_eq!(file.parts[0].name, "MESH");
+    }
+
+    #[test]
+    fn a_projection_goes_across_the_parts_of_a_file() {
+        let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 4 0 0\nv 4 2 0\nvt 9 9\nf 1/1 2/1 3/1\nf 2 4 5\n";
+        let mut file = load_bytes("two.obj", text).unwrap();
+        assert_eq!(file.parts.len(), 2);
+        file.project(Projection::Planar);
+        let whole = file.into_single_mesh();
+        assert_eq!(whole.texcoords.len(), whole.positions.len());
+        for (p, st) in whole.positions.iter().zip(&whole.texcoords) {
+            assert_eq!(*st, p.truncate() / 4.0);
+        }
     }
 
     #[test]

@@ -26,6 +26,7 @@ const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
 
 /// Reads the bytes of the file at `path`.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|e| LoadMeshErrorKind::NotText {
         line: 1 + bytes[..e.valid_up_to()]
             .iter()
@@ -156,41 +157,32 @@ impl<'a> Libraries<'a> {
             let words = name.split_whitespace();
             words.map(|n| super::beside(self.obj, n)).collect()
         };
-        let mut materials = Vec::new();
-        let mut by_name = None;
+        let known = self.of_material.len();
+        let mut text = String::new();
         for file in files {
-            let (mut found, names) = self.load_file(&file)?;
-            let offset = materials.len();
-            self.of_material.extend(found.iter().map(|_| file.clone()));
-            materials.append(&mut found);
-            let all = by_name.get_or_insert_with(Default::default);
-            merge(all, names, offset);
+            let cleaned = self.read_library(&file);
+            let materials = cleaned.lines().filter(|l| l.starts_with("newmtl "));
+            self.of_material.extend(materials.map(|_| file.clone()));
+            text += &cleaned;
         }
-        Ok((materials, by_name.unwrap_or_default()))
+        tobj::load_mtl_buf(&mut text.as_bytes()).inspect_err(|e| {
+            self.of_material.truncate(known);
+            self.warnings.push(format!("material library {name}: {e}"));
+        })
     }
 
-    fn load_file(&mut self, file: &Path) -> tobj::MTLLoadResult {
-        let bytes = std::fs::read(file).unwrap_or_else(|e| {
-            let shown = file.display();
-            self.warnings
-                .push(format!("cannot read the material library {shown}: {e}"));
-            Vec::new()
-        });
-        let text = String::from_utf8_lossy(&bytes);
-        let cleaned = mtl::clean(&text, file, &mut self.warnings);
-        tobj::load_mtl_buf(&mut cleaned.as_bytes())
+    /// Its usable statements; none, and a warning, if it cannot be read.
+    fn read_library(&mut self, file: &Path) -> String {
+        match super::read_regular(file) {
+            Ok(bytes) => mtl::clean(&String::from_utf8_lossy(&bytes), file, &mut self.warnings),
+            Err(e) => {
+                let shown = file.display();
+                self.warnings
+                    .push(format!("cannot read the material library {shown}: {e}"));
+                String::new()
+            }
+        }
     }
-}
-
-fn merge<M>(all: &mut M, names: M, offset: usize)
-where
-    M: IntoIterator<Item = (String, usize)> + Extend<(String, usize)>,
-{
-    all.extend(
-        names
-            .into_iter()
-            .map(|(name, index)| (name, index + offset)),
-    );
 }
 
 /// How many of each element have been defined.
@@ -510,6 +502,13 @@ mod tests {
         assert_eq!(mesh.triangles, [[0, 1, 2]]);
         assert_eq!(mesh.positions[1], Vec3::X);
         assert_eq!(mesh.texcoords[0], Vec2::new(0.5, 0.0));
+    }
+
+    #[test]
+    fn a_byte_order_mark_does_not_hide_the_first_vertex() {
+        let text = "\u{feff}v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        let file = load_bytes("m.obj", text.as_bytes()).unwrap();
+        assert_eq!(file.parts[0].mesh.positions[0], Vec3::ZERO);
     }
 
     #[test]

@@ -1,0 +1,407 @@
+//! The program as its users meet it: help, the round trip of a query, reports, pictures.
+
+mod program;
+
+use program::{FLAT, Folder, SCENE, stderr, stdout};
+
+/// Runs the program, which must succeed, and gives its standard output.
+#[track_caller]
+fn done(folder: &Folder, arguments: &[&str]) -> String {
+    let output = folder.run(arguments);
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        stderr(&output)
+    );
+    stdout(&output)
+}
+
+/// The numbers of each row of a table of hits.
+fn rows(table: &str) -> Vec<Vec<f64>> {
+    let number = |field: &str| field.parse().unwrap();
+    let row = |line: &str| line.split(',').map(number).collect();
+    table.lines().skip(1).map(row).collect()
+}
+
+fn near(found: &[f64], expected: &[f64]) -> bool {
+    found.len() == expected.len()
+        && found
+            .iter()
+            .zip(expected)
+            .all(|(a, b)| (a - b).abs() < 1e-6)
+}
+
+const BACKENDS: &[&str] = &[
+    #[cfg(feature = "embree")]
+    "embree",
+    #[cfg(feature = "bvh")]
+    "bvh",
+];
+
+#[test]
+fn help_names_verbs_options_and_examples() {
+    let folder = Folder::empty();
+    let help = done(&folder, &["--help"]);
+    for word in [
+        "render",
+        "query",
+        "info",
+        "demo",
+        "Examples:",
+        "Exit codes:",
+    ] {
+        assert!(help.contains(word), "{word}");
+    }
+    let options: [(&str, &[&str]); 4] = [
+        (
+            "render",
+            &[
+                "--output",
+                "--size",
+                "--spp",
+                "--threads",
+                "--seed",
+                "--backend",
+                "--stats",
+                "--quiet",
+            ],
+        ),
+        (
+            "query",
+            &[
+                "--mesh",
+                "--map",
+                "--scale",
+                "--channel",
+                "--midlevel",
+                "--wrap",
+                "--march",
+                "--dt",
+                "--dt-world",
+                "--jitter",
+                "--rays",
+                "--output",
+            ],
+        ),
+        ("info", &["--json"]),
+        ("demo", &["--out", "--list", "--no-render"]),
+    ];
+    for (verb, options) in options {
+        let help = done(&folder, &[verb, "--help"]);
+        assert!(help.contains("Examples:"), "{verb}");
+        for option in options {
+            assert!(help.contains(option), "{verb} {option}");
+        }
+    }
+    let version = done(&folder, &["--version"]);
+    assert_eq!(
+        version.trim(),
+        concat!("prismarch ", env!("CARGO_PKG_VERSION"))
+    );
+}
+
+#[test]
+fn unknown_words_are_usage_errors() {
+    for arguments in [
+        &["rendre"][..],
+        &["render"],
+        &["render", "a.toml", "--fast"],
+        &["query"],
+        &[],
+    ] {
+        let output = Folder::empty().run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    }
+    let output = Folder::empty().run(&["demo", "teapot"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("teapot") && stderr(&output).contains("asteroid"));
+}
+
+#[test]
+fn a_lifted_plane_is_hit_where_it_is() {
+    let rays = "\
+ox,oy,oz,dx,dy,dz,tnear,tfar
+0.3,0.2,2,0,0,-1,0,inf
+0.3,0.2,2,0,0,-4,0,
+5,5,2,0,0,-1,0,inf
+0.3,0.2,2,0,0,-1,0,1.5
+-0.5,0.25,-1,0,0,0.5,0,inf
+";
+    let plane = |t: f64, x: f64, y: f64| vec![t, x, y, FLAT, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, FLAT];
+    let expected = [
+        Some(plane(2.0 - FLAT, 0.3, 0.2)),
+        Some(plane((2.0 - FLAT) / 4.0, 0.3, 0.2)),
+        None,
+        None,
+        Some(plane((1.0 + FLAT) / 0.5, -0.5, 0.25)),
+    ];
+    let surface = ["--mesh", "quad.obj", "--map", "flat.png", "--scale", "0.2"];
+    let table = ["--rays", "rays.csv", "-o", "hits.csv"];
+    for backend in BACKENDS {
+        for source in [&surface[..], &["scene.toml"]] {
+            let folder = Folder::with_quad();
+            folder.put("rays.csv", rays);
+            let query = [&["query", "--backend", *backend], source, &table].concat();
+            assert_eq!(done(&folder, &query), "");
+            let hits = folder.text("hits.csv");
+            let header = "hit,t,mesh,prim,u,v,px,py,pz,ngx,ngy,ngz,nsx,nsy,nsz,displacement";
+            assert_eq!(hits.lines().next(), Some(header));
+            let hits = rows(&hits);
+            assert_eq!(hits.len(), expected.len());
+            for (hit, expected) in hits.iter().zip(&expected) {
+                let Some(expected) = expected else {
+                    assert_eq!(hit, &[0.0; 16]);
+                    continue;
+                };
+                assert_eq!(hit[0], 1.0);
+                let numbers = [&hit[1..2], &hit[6..]].concat();
+                assert!(near(&numbers, expected), "{hit:?} {expected:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn instances_are_hit_in_world_space() {
+    let folder = Folder::with_quad();
+    // Turned by a quarter about y, +z becomes +x; doubled, so is the displacement.
+    let instances = "instances = [ { translate = [10, 0, 0] }, { translate = [0, 0, 9], rotate = [0, 90, 0], scale = 2 } ]\nfile =";
+    folder.put("scene.toml", SCENE.replace("file =", instances));
+    let rays = "ox,oy,oz,dx,dy,dz\n10,0.5,3,0,0,-1\n4,0.5,9.5,-1,0,0\n0,0.5,3,0,0,-1\n";
+    for backend in BACKENDS {
+        let query = ["query", "scene.toml", "--backend", backend, "--rays", "-"];
+        let output = folder.run_with_input(&query, rays);
+        assert!(output.status.success(), "{}", stderr(&output));
+        let hits = rows(&stdout(&output));
+        let place = |hit: &[f64]| [&hit[1..2], &hit[6..12]].concat();
+        assert!(
+            near(
+                &place(&hits[0]),
+                &[3.0 - FLAT, 10.0, 0.5, FLAT, 0.0, 0.0, 1.0]
+            ),
+            "{hits:?}"
+        );
+        let turned = 2.0 * FLAT;
+        assert!(
+            near(
+                &place(&hits[1]),
+                &[4.0 - turned, turned, 0.5, 9.5, 1.0, 0.0, 0.0]
+            ),
+            "{hits:?}"
+        );
+        assert_eq!(hits[2], [0.0; 16]);
+    }
+}
+
+#[test]
+fn rows_keep_their_order_over_many_chunks() {
+    let folder = Folder::with_quad();
+    let count = 150_000;
+    let x = |i: usize| -0.9 + 1.8 * i as f64 / count as f64;
+    let rays: String = (0..count)
+        .map(|i| format!("{},0.1,2,0,0,-1\n", x(i)))
+        .collect();
+    folder.put("rays.csv", format!("ox,oy,oz,dx,dy,dz\n{rays}"));
+    done(
+        &folder,
+        &[
+            "query",
+            "scene.toml",
+            "--rays",
+            "rays.csv",
+            "-o",
+            "hits.csv",
+        ],
+    );
+    let hits = rows(&folder.text("hits.csv"));
+    assert_eq!(hits.len(), count);
+    for (i, hit) in hits.iter().enumerate() {
+        assert!((hit[6] - x(i)).abs() < 1e-5, "row {i}: {hit:?}");
+    }
+}
+
+#[test]
+fn the_same_seed_jitters_the_same_way() {
+    let folder = Folder::with_quad();
+    let query = |seed| {
+        [
+            "query",
+            "scene.toml",
+            "--jitter",
+            seed,
+            "--dt",
+            "2",
+            "--rays",
+            "-",
+        ]
+    };
+    let rays = "ox,oy,oz,dx,dy,dz\n0.1,0.1,2,0.1,0,-1\n";
+    let run = |seed| stdout(&folder.run_with_input(&query(seed), rays));
+    assert_eq!(run("7"), run("7"));
+    assert!(run("8").lines().count() == 2);
+}
+
+#[test]
+fn info_counts_triangles_and_bytes() {
+    let folder = Folder::with_quad();
+    let plain = "\n[[mesh]]\nname = \"floor\"\nfile = \"quad.obj\"\ninstances = [ {}, { translate = [0, 0, -1] } ]\n";
+    folder.put("scene.toml", format!("{SCENE}{plain}"));
+    let info: serde_json::Value =
+        serde_json::from_str(&done(&folder, &["info", "scene.toml", "--json"])).unwrap();
+    assert_eq!(info["triangles"], 4);
+    assert_eq!(info["displaced_triangles"], 2);
+    assert_eq!(info["objects"][0]["name"], "quad");
+    assert_eq!(info["objects"][1]["name"], "floor");
+    assert_eq!(info["objects"][1]["instances"], 2);
+    let map = &info["maps"][0];
+    assert_eq!((&map["width"], &map["height"]), (&8.into(), &8.into()));
+    assert_eq!(map["format"], "16-bit");
+    let bytes = |value: &serde_json::Value| value.as_u64().unwrap();
+    assert!(bytes(&map["bytes"]) >= 128);
+    let memory = &info["memory"];
+    // 108 bytes per base triangle, as in the paper.
+    assert_eq!(bytes(&memory["overhead"]["prisms"]), 2 * 108);
+    let common = &memory["common"];
+    let common = bytes(&common["maps"]) + bytes(&common["meshes"]) + bytes(&common["bvh"]);
+    assert_eq!(bytes(&memory["total"]), common + 2 * 108);
+    let text = done(&folder, &["info", "scene.toml"]);
+    for word in ["floor", "8x8", "16-bit", "overhead", "216 B"] {
+        assert!(text.contains(word), "no {word} in {text}");
+    }
+}
+
+#[test]
+fn a_render_writes_a_picture_and_its_statistics() {
+    for backend in BACKENDS {
+        let folder = Folder::with_quad();
+        let options = [
+            "--backend",
+            backend,
+            "--stats",
+            "stats.json",
+            "--threads",
+            "2",
+            "--seed",
+            "5",
+        ];
+        let output = folder.run(&[&["render", "scene.toml"], &options[..]].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let line = stdout(&output);
+        assert!(
+            line.starts_with("scene.png: 16x12, 1 spp, ") && line.ends_with(" Mrays/s\n"),
+            "{line}"
+        );
+        assert!(stderr(&output).contains("100 %"));
+        let picture = prismarch::image::load_color(
+            &folder.path("scene.png"),
+            prismarch::image::ColorSpace::Srgb,
+        );
+        let picture = picture.unwrap();
+        assert_eq!((picture.width, picture.height), (16, 12));
+        let stats: serde_json::Value = serde_json::from_str(&folder.text("stats.json")).unwrap();
+        assert_eq!(stats["rays"]["camera"], 16 * 12);
+        assert_eq!(stats["threads"], 2);
+        assert_eq!(stats["seed"], 5);
+        assert_eq!(stats["version"], env!("CARGO_PKG_VERSION"));
+        for phase in ["load", "build", "render", "write", "total"] {
+            assert!(stats["seconds"][phase].as_f64().unwrap() >= 0.0, "{phase}");
+        }
+        assert!(stats["mrays_per_second"].as_f64().unwrap() > 0.0);
+        assert!(stats["backend"].as_str().unwrap().len() > 3 && stats["simd"].is_string());
+        assert_eq!(stats["memory"]["overhead"]["prisms"], 216);
+    }
+}
+
+#[test]
+fn options_win_over_the_scene_and_quiet_is_quiet() {
+    let folder = Folder::with_quad();
+    let output = folder.run(&[
+        "render",
+        "scene.toml",
+        "-o",
+        "a.exr",
+        "--size",
+        "20x10",
+        "--spp",
+        "2",
+        "--quiet",
+    ]);
+    assert!(output.status.success());
+    assert_eq!(
+        (stdout(&output), stderr(&output)),
+        (String::new(), String::new())
+    );
+    let picture =
+        prismarch::image::load_color(&folder.path("a.exr"), prismarch::image::ColorSpace::Linear);
+    let picture = picture.unwrap();
+    assert_eq!((picture.width, picture.height), (20, 10));
+}
+
+#[test]
+fn a_picture_is_the_same_for_any_number_of_threads() {
+    let folder = Folder::with_quad();
+    for (threads, picture) in [("1", "a.exr"), ("3", "b.exr")] {
+        done(
+            &folder,
+            &["render", "scene.toml", "-o", picture, "--threads", threads],
+        );
+    }
+    let pixels = |name: &str| {
+        let image =
+            prismarch::image::load_color(&folder.path(name), prismarch::image::ColorSpace::Linear);
+        let image = image.unwrap();
+        (0..16 * 12)
+            .map(|i| image.pixel(i % 16, i / 16))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(pixels("a.exr"), pixels("b.exr"));
+}
+
+#[test]
+fn a_demo_can_be_written_and_rendered_again() {
+    let folder = Folder::empty();
+    assert!(done(&folder, &["demo", "--list"]).contains("asteroid"));
+    let small = ["--map-size", "256", "--size", "16x12", "--spp", "1"];
+    let line = done(&folder, &[&["demo", "--out", "rock"], &small[..]].concat());
+    assert!(line.starts_with("rock/asteroid.png: 16x12"), "{line}");
+    done(
+        &folder,
+        &[
+            "render",
+            "rock/asteroid.toml",
+            "--size",
+            "8x6",
+            "--spp",
+            "1",
+        ],
+    );
+    assert!(folder.path("asteroid.png").exists());
+    let info = done(&folder, &["info", "rock/asteroid.toml", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&info).unwrap();
+    assert_eq!(info["displaced_triangles"], 480);
+    let scene = done(
+        &folder,
+        &["demo", "asteroid", "--map-size", "256", "--no-render"],
+    );
+    assert_eq!(scene, "asteroid/asteroid.toml\n");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_leaves_ends_the_query_quietly() {
+    use std::process::{Command, Stdio};
+    let folder = Folder::with_quad();
+    let rays = "0,0,2,0,0,-1\n".repeat(200_000);
+    folder.put("rays.csv", format!("ox,oy,oz,dx,dy,dz\n{rays}"));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_prismarch"))
+        .args(["query", "scene.toml", "--rays", "rays.csv"])
+        .current_dir(folder.path(""))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(stderr(&output), "");
+    assert!(output.status.success());
+}

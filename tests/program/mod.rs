@@ -1,0 +1,119 @@
+//! Runs the program in a folder of its own.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+use prismarch::image::write_png_gray16;
+use tempfile::TempDir;
+
+/// A square of two triangles, 2 by 2 around the origin in the plane z = 0, seen from +z.
+pub const QUAD: &str = "\
+v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0
+vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
+vn 0 0 1
+f 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/4/1
+";
+
+/// The quad displaced by `flat.png`.
+pub const SCENE: &str = "\
+[film]
+width = 16
+height = 12
+spp = 1
+
+[[mesh]]
+file = \"quad.obj\"
+
+[mesh.displacement]
+map = \"flat.png\"
+scale = 0.2
+";
+
+/// What the height 32768 of `flat.png` displaces by under the scale of [`SCENE`].
+#[allow(dead_code)] // not every test program asks
+pub const FLAT: f64 = 0.2 * 32768.0 / 65535.0;
+
+pub struct Folder(TempDir);
+
+impl Folder {
+    /// An empty folder.
+    pub fn empty() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    /// A folder with `quad.obj`, `flat.png` (8x8 texels of height 32768) and `scene.toml`.
+    pub fn with_quad() -> Self {
+        let folder = Self::empty();
+        folder.put("quad.obj", QUAD);
+        folder.put("scene.toml", SCENE);
+        write_png_gray16(&folder.path("flat.png"), 8, 8, &[32768; 64]).unwrap();
+        folder
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), bytes).unwrap();
+    }
+
+    #[allow(dead_code)] // not every test program asks
+    pub fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// The names of all files, hidden ones too.
+    pub fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.0.path()).unwrap();
+        let mut names: Vec<_> = entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    /// Runs the program here.
+    pub fn run(&self, arguments: &[&str]) -> Output {
+        self.run_with_input(arguments, "")
+    }
+
+    pub fn run_with_input(&self, arguments: &[&str], input: &str) -> Output {
+        let program = Command::new(env!("CARGO_BIN_EXE_prismarch"));
+        self.finish(program, arguments, input)
+    }
+
+    /// Runs the program here, unable to write files of more than 512 bytes: what a full disk does, without one.
+    #[cfg(unix)]
+    #[allow(dead_code)] // not every test program asks
+    pub fn run_on_full_disk(&self, arguments: &[&str]) -> Output {
+        let mut shell = Command::new("sh");
+        // An ignored signal stays ignored: the write fails instead of ending the program.
+        shell.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\""]);
+        shell.arg(env!("CARGO_BIN_EXE_prismarch"));
+        self.finish(shell, arguments, "")
+    }
+
+    fn finish(&self, mut program: Command, arguments: &[&str], input: &str) -> Output {
+        let mut child = program
+            .args(arguments)
+            .current_dir(self.0.path())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // A program that ends before it has read its input is no failure of the test.
+        let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
+        child.wait_with_output().unwrap()
+    }
+}
+
+pub fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
