@@ -111,7 +111,7 @@ fn ornament(longitude: f32, latitude: f32, p: Vec3) -> f32 {
     match above {
         a if a < 13.2 => raise(plait(longitude, latitude)),
         a if a < 18.2 => {}
-        a if a < 49.6 => raise(medallions(longitude, above, p)),
+        a if a < 49.6 => raise(medallions(longitude, p)),
         a if a < 55.0 => raise(rope(longitude, above, 52.3, 2.1, 96.0)),
         a if a < 74.0 => raise(lobes(longitude, above)),
         _ => raise(crown(longitude, above)),
@@ -243,7 +243,7 @@ fn crown(longitude: f32, latitude: f32) -> f32 {
 }
 
 /// Ten medallions on each side of the equator, two designs in turn, palmettes in the gaps.
-fn medallions(longitude: f32, latitude: f32, p: Vec3) -> f32 {
+fn medallions(longitude: f32, p: Vec3) -> f32 {
     const COUNT: f32 = 10.0;
     const MIDDLE: f32 = 33.5;
     const RADIUS: f32 = 13.4;

@@ -137,10 +137,8 @@ fn collar(u: f32, t: f32) -> f32 {
     let x = (u * 40.0).rem_euclid(1.0) - 0.5;
     let stud = 0.55 * round(x.hypot((d - 0.072) * 22.0), 0.36);
     let bed = 0.42 * smoothstep(COLLAR, COLLAR - 0.01, d);
-    let between = (bed + stud) * smoothstep(0.050, 0.060, d);
-    (outer * smoothstep(0.062, 0.056, d))
-        .max(inner * smoothstep(COLLAR, 0.11, d))
-        .max(between)
+    let inside = (bed + stud).max(inner * smoothstep(COLLAR, 0.11, d));
+    (outer * smoothstep(0.062, 0.056, d)).max(inside * smoothstep(0.050, 0.060, d))
 }
 
 /// The upper head: scales that shrink to wrinkles on the snout, brows, nostrils, a lip.
