@@ -145,8 +145,8 @@ impl fmt::Display for Info {
                 instances,
                 ..
             } = object;
-            let displaced = if object.displaced { "displaced" } else { "" };
-            writeln!(f, "  {name:32} {triangles:>11} {instances:>9}  {displaced}")?;
+            let displaced = if object.displaced { "  displaced" } else { "" };
+            writeln!(f, "  {name:32} {triangles:>11} {instances:>9}{displaced}")?;
         }
         if !self.maps.is_empty() {
             writeln!(f, "\nmaps")?;

@@ -130,7 +130,10 @@ impl RayReader {
             count: 0,
         };
         let mut header = Row::default();
-        lines.read(&mut header)?;
+        if !lines.read(&mut header)? {
+            let (file, found) = (lines.file, "an empty file".into());
+            return Err(RayError::Header { file, found });
+        }
         let layout = Layout::new(lines.file.clone(), &header)?;
         Ok(Self { lines, layout })
     }
@@ -377,7 +380,8 @@ mod tests {
     #[test]
     fn headers_must_fit() {
         assert!(refusal("ox,oy,oz,dx,dy\n").contains("no column dz"));
-        assert!(refusal("").contains("rays.csv:1: found no column ox"));
+        assert!(refusal("").contains("rays.csv:1: found an empty file"));
+        assert!(refusal("\n\n").contains("found an empty file"));
         assert!(refusal("ox,oy,oz,dx,dy,dz,time\n").contains("the column time"));
         assert!(refusal("ox,ox,oy,oz,dx,dy,dz\n").contains("ox twice"));
     }
