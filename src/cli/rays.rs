@@ -130,7 +130,10 @@ impl RayReader {
             count: 0,
         };
         let mut header = Row::default();
-        lines.read(&mut header)?;
+        if !lines.read(&mut header)? {
+            let (file, found) = (lines.file, "an empty file".into());
+            return Err(RayError::Header { file, found });
+        }
         let layout = Layout::new(lines.file.clone(), &header)?;
         Ok(Self { lines, layout })
     }
@@ -190,10 +193,6 @@ impl Layout {
         let mut index = [None; 8];
         let text = String::from_utf8_lossy(&header.text);
         let text = text.trim_start_matches('\u{feff}'); // as spreadsheets begin a file
-        if text.is_empty() {
-            let found = "an empty file".into();
-            return Err(RayError::Header { file, found });
-        }
         let names: Vec<_> = text.split(',').map(str::trim).collect();
         for (position, name) in names.iter().enumerate() {
             let slot = COLUMNS.iter().position(|column| column == name);
@@ -382,6 +381,7 @@ mod tests {
     fn headers_must_fit() {
         assert!(refusal("ox,oy,oz,dx,dy\n").contains("no column dz"));
         assert!(refusal("").contains("rays.csv:1: found an empty file"));
+        assert!(refusal("\n\n").contains("found an empty file"));
         assert!(refusal("ox,oy,oz,dx,dy,dz,time\n").contains("the column time"));
         assert!(refusal("ox,ox,oy,oz,dx,dy,dz\n").contains("ox twice"));
     }

@@ -384,6 +384,7 @@ fov = 33.0
 
 [film]
 spp = 16
+exposure = 0.3
 
 [[mesh]]
 file = "orb.obj"
@@ -413,7 +414,7 @@ roughness = 0.25
 [[light]]
 type = "sun"
 elevation = 38.0
-azimuth = 50.0
+azimuth = 28.0
 
 [[light]]
 type = "sky"

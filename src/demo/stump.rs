@@ -394,8 +394,8 @@ fn bark_color(around: Vec2, t: f32, relief: f32) -> Vec3 {
     let q = around.extend(0.21 * t);
     let mottle = fbm3(61, 30.0 * q, Octaves::new(4));
     let furrow = Vec3::new(0.035, 0.020, 0.013);
-    let plate = Vec3::new(0.20, 0.145, 0.105)
-        .lerp(Vec3::new(0.30, 0.26, 0.215), smoothstep(-0.3, 0.4, mottle));
+    let plate = Vec3::new(0.27, 0.20, 0.145)
+        .lerp(Vec3::new(0.40, 0.345, 0.285), smoothstep(-0.3, 0.4, mottle));
     let mut color = furrow.lerp(plate, smoothstep(-0.13, 0.10, relief));
     let lichen = fbm3(62, 55.0 * q, Octaves::new(3));
     color = color.lerp(
@@ -443,10 +443,11 @@ fn scene(scale: f32, midlevel: f32) -> String {
         r#"[camera]
 position = [0.6, 2.15, 3.7]
 target = [0.0, 0.42, 0.0]
-fov = 36.0
+fov = 32.0
 
 [film]
 spp = 16
+exposure = 0.6
 
 [[mesh]]
 file = "stump.obj"
@@ -476,7 +477,7 @@ specular = 0.2
 [[light]]
 type = "sun"
 elevation = 36.0
-azimuth = 75.0
+azimuth = 40.0
 
 [[light]]
 type = "sky"
