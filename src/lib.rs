@@ -1,4 +1,8 @@
-//! prismarch ray traces displaced surfaces without tessellating them.
+#![cfg_attr(feature = "embree", doc = include_str!("../README.md"))]
+#![cfg_attr(
+    not(feature = "embree"),
+    doc = "Ray traces displaced surfaces without tessellating them."
+)]
 
 #[cfg(feature = "bvh")]
 pub mod bvh;

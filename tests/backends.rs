@@ -353,9 +353,10 @@ fn a_transform_without_an_inverse_is_refused() {
 
 #[cfg(feature = "embree")]
 mod embree {
-    use prismarch::demo::{DEMOS, Demo};
+    use prismarch::demo::DEMOS;
     use prismarch::embree::{EmbreeOptions, EmbreeTracer};
     use prismarch::scene::{Camera, Loaded};
+    use rayon::prelude::*;
 
     use super::*;
 
@@ -411,13 +412,9 @@ mod embree {
     /// Every demo's camera rays, and from every hit a ray to the sky.
     #[test]
     fn demos_look_the_same() {
-        for demo in DEMOS {
+        DEMOS.par_iter().for_each(|demo| {
             let folder = tempfile::tempdir().unwrap();
-            let small = Demo {
-                map_size: 512,
-                ..*demo
-            };
-            let scene = Loaded::from_file(&small.write(folder.path()).unwrap())
+            let scene = Loaded::from_file(&demo.write(folder.path(), 512).unwrap())
                 .unwrap()
                 .scene;
             let world = scene.world().unwrap();
@@ -445,7 +442,7 @@ mod embree {
                 }
             }
             compare_closely(&camera, &|r| bvh.intersect(r), &|r| embree.intersect(r));
-        }
+        });
     }
 
     fn is_displaced(world: &World, hit: &Hit) -> bool {

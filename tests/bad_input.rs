@@ -25,7 +25,7 @@ fn holds(output: &Output, code: i32, words: &[&str]) {
     let message = stderr(output);
     assert_eq!(output.status.code(), Some(code), "{message}");
     assert!(message.starts_with("prismarch: error: "), "{message}");
-    assert_eq!(message.matches("error:").count(), 1, "{message}");
+    assert_eq!(message.matches("prismarch: error:").count(), 1, "{message}");
     for word in words {
         assert!(message.contains(word), "no {word:?} in: {message}");
     }

@@ -28,7 +28,7 @@ pub enum CliError {
     Scene(#[from] SceneError),
     /// A file named on the command line.
     #[error(transparent)]
-    Asset(#[from] AssetError),
+    Asset(Box<AssetError>),
     /// How a surface is to be marched.
     #[error(transparent)]
     March(#[from] MarchError),
@@ -71,6 +71,12 @@ pub enum CliError {
     /// Whoever read our standard output has stopped: a quiet end.
     #[error("the reader of standard output is gone")]
     ReaderGone,
+}
+
+impl From<AssetError> for CliError {
+    fn from(error: AssetError) -> Self {
+        Self::Asset(Box::new(error))
+    }
 }
 
 impl CliError {

@@ -63,8 +63,8 @@ impl Target {
             Format::Exr => {
                 let pixels: Vec<_> = from_bottom.map(|radiance| radiance.to_array()).collect();
                 let channels = ExrChannel::rgb(None, &pixels).into();
-                let software = concat!("prismarch ", env!("CARGO_PKG_VERSION"));
-                let attributes = [("software", software)];
+                let renderer = concat!("prismarch ", env!("CARGO_PKG_VERSION"));
+                let attributes = [("renderer", renderer)];
                 write_exr(&self.path, width, height, channels, &attributes)?;
             }
         }

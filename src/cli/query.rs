@@ -4,18 +4,17 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use csv::ByteRecord;
 use rayon::prelude::*;
 
 use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
 use super::hits;
 use super::parse;
-use super::rays::{Layout, RayError, RayReader};
+use super::rays::{Layout, RayError, RayReader, Row};
 use crate::image::{Channel, atomic};
 use crate::prism::{March, Step};
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
-use crate::surface::{Displacement, UvTransform, Wrap};
+use crate::surface::{Displacement, Projection, UvTransform, Wrap};
 use crate::trace::World;
 
 /// Trace rays from a CSV table and write their hits
@@ -64,6 +63,9 @@ struct SurfaceArgs {
     /// Mesh file: .obj, .gltf, .glb or .ply
     #[arg(long, value_name = "FILE", requires_all = ["map", "scale"])]
     mesh: Option<PathBuf>,
+    /// Where the mesh's texture coordinates come from
+    #[arg(long, value_enum, value_name = "KIND", default_value_t = TexcoordKind::File, requires = "mesh")]
+    texcoords: TexcoordKind,
     /// Displacement map: PNG, TIFF, EXR, JPEG
     #[arg(long, value_name = "FILE", requires = "mesh")]
     map: Option<PathBuf>,
@@ -85,6 +87,32 @@ struct SurfaceArgs {
 enum MarchKind {
     /// Equal steps along the ray, as in the paper
     Uniform,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum TexcoordKind {
+    /// The mesh file
+    File,
+    /// Six sides around the mesh, each face takes the nearest
+    Box,
+    /// Longitude and latitude around the middle of the mesh
+    Spherical,
+    /// Longitude around the vertical axis, and height
+    Cylindrical,
+    /// Along the mesh's shortest side
+    Planar,
+}
+
+impl TexcoordKind {
+    fn projection(self) -> Option<Projection> {
+        match self {
+            Self::File => None,
+            Self::Box => Some(Projection::Box),
+            Self::Spherical => Some(Projection::Spherical),
+            Self::Cylindrical => Some(Projection::Cylindrical),
+            Self::Planar => Some(Projection::Planar),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -157,6 +185,7 @@ impl Args {
                 let Ok(channel): Result<Channel, _> = self.surface.channel.parse();
                 Ok(Loaded::from_mesh_and_map(&MeshAndMap {
                     mesh: mesh.clone(),
+                    texcoords: self.surface.texcoords.projection(),
                     map: map.clone(),
                     channel,
                     wrap: self.surface.wrap.into(),
@@ -213,7 +242,7 @@ enum Stop {
 impl Query<'_> {
     /// Traces all rays, chunk by chunk.
     fn run(&self, rays: &mut RayReader, out: &mut impl Write) -> Result<(), Stop> {
-        let mut rows = vec![ByteRecord::new(); CHUNK];
+        let mut rows = vec![Row::default(); CHUNK];
         let mut first = 0;
         out.write_all(hits::HEADER.as_bytes())
             .map_err(Stop::Write)?;
@@ -234,12 +263,7 @@ impl Query<'_> {
     }
 
     /// The hits of these rows, in order and in pieces; the first bad row is the error.
-    fn trace(
-        &self,
-        rows: &[ByteRecord],
-        first: u64,
-        layout: &Layout,
-    ) -> Result<Vec<Vec<u8>>, RayError> {
+    fn trace(&self, rows: &[Row], first: u64, layout: &Layout) -> Result<Vec<Vec<u8>>, RayError> {
         const PIECE: usize = 1 << 10;
         let pieces = rows.par_chunks(PIECE).enumerate();
         let traced: Vec<Result<Vec<u8>, RayError>> = pieces
@@ -251,12 +275,7 @@ impl Query<'_> {
         traced.into_iter().collect()
     }
 
-    fn trace_piece(
-        &self,
-        rows: &[ByteRecord],
-        first: u64,
-        layout: &Layout,
-    ) -> Result<Vec<u8>, RayError> {
+    fn trace_piece(&self, rows: &[Row], first: u64, layout: &Layout) -> Result<Vec<u8>, RayError> {
         let tracer = self.engine.tracer();
         let mut table = Vec::new();
         for (row, number) in rows.iter().zip(first..) {

@@ -1,11 +1,11 @@
 //! A table of rays: CSV with a header, columns in any order, `tnear` and `tfar` optional.
+//!
+//! Numbers need no quotes, so a row is a line, and its number is the one that an editor shows.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-use csv::{ByteRecord, ReaderBuilder, Trim};
-use glam::Vec3;
 use thiserror::Error;
 
 use crate::ray::Ray;
@@ -47,6 +47,16 @@ pub enum RayError {
         /// Columns of the header.
         expected: usize,
     },
+    /// A line too long for a table of numbers.
+    #[error(
+        "{file}:{line}: found a line of {LONGEST} bytes or more; expected comma-separated numbers"
+    )]
+    LongLine {
+        /// The file.
+        file: String,
+        /// From 1; the header is the first.
+        line: u64,
+    },
     /// A value that does not fit.
     #[error("{file}:{line}: {column}: found {found}; expected {expected}")]
     Value {
@@ -63,10 +73,29 @@ pub enum RayError {
     },
 }
 
+/// One row of the table. It is split and read as numbers later, on many threads.
+#[derive(Clone, Debug, Default)]
+pub struct Row {
+    /// From 1; the header is the first.
+    line: u64,
+    text: Vec<u8>,
+}
+
+/// Longest row, bytes: what is longer is no table of numbers.
+const LONGEST: u64 = 1 << 12;
+
 /// Reads rays, many rows at a time.
 pub struct RayReader {
-    csv: csv::Reader<Box<dyn Read>>,
+    lines: Lines,
     layout: Layout,
+}
+
+/// The lines of a file that are not blank.
+struct Lines {
+    file: String,
+    input: BufReader<Box<dyn Read>>,
+    /// Lines read so far.
+    count: u64,
 }
 
 /// Where the columns are.
@@ -95,18 +124,15 @@ impl RayReader {
     }
 
     fn new(file: String, input: Box<dyn Read>) -> Result<Self, RayError> {
-        let mut csv = ReaderBuilder::new()
-            .has_headers(true)
-            .flexible(true) // rows of a wrong length get our own message
-            .quoting(false)
-            .trim(Trim::All)
-            .from_reader(input);
-        let header = csv
-            .byte_headers()
-            .map_err(|e| read_error(&file, e))?
-            .clone();
-        let layout = Layout::new(file, &header)?;
-        Ok(Self { csv, layout })
+        let mut lines = Lines {
+            file,
+            input: BufReader::with_capacity(1 << 16, input),
+            count: 0,
+        };
+        let mut header = Row::default();
+        lines.read(&mut header)?;
+        let layout = Layout::new(lines.file.clone(), &header)?;
+        Ok(Self { lines, layout })
     }
 
     /// Where the columns are.
@@ -116,10 +142,9 @@ impl RayReader {
 
     /// Fills `rows` from its start with the next rows; the number of rows read is less than its length only
     /// at the end of the table.
-    pub fn read(&mut self, rows: &mut [ByteRecord]) -> Result<usize, RayError> {
+    pub fn read(&mut self, rows: &mut [Row]) -> Result<usize, RayError> {
         for (done, row) in rows.iter_mut().enumerate() {
-            let more = self.csv.read_byte_record(row);
-            if !more.map_err(|e| read_error(&self.layout.file, e))? {
+            if !self.lines.read(row)? {
                 return Ok(done);
             }
         }
@@ -127,10 +152,45 @@ impl RayReader {
     }
 }
 
+impl Lines {
+    /// The next line that is not blank; false at the end.
+    fn read(&mut self, row: &mut Row) -> Result<bool, RayError> {
+        loop {
+            row.text.clear();
+            let mut input = self.input.by_ref().take(LONGEST);
+            let read = input.read_until(b'\n', &mut row.text);
+            let length = read.map_err(|source| RayError::Read {
+                file: self.file.clone(),
+                source,
+            })?;
+            self.count += 1;
+            row.line = self.count;
+            if length as u64 == LONGEST {
+                return Err(RayError::LongLine {
+                    file: self.file.clone(),
+                    line: row.line,
+                });
+            }
+            if length == 0 || !row.text.trim_ascii().is_empty() {
+                return Ok(length > 0);
+            }
+        }
+    }
+}
+
+impl Row {
+    fn fields(&self) -> impl Iterator<Item = &[u8]> {
+        let fields = self.text.split(|&byte| byte == b',');
+        fields.map(<[u8]>::trim_ascii)
+    }
+}
+
 impl Layout {
-    fn new(file: String, header: &ByteRecord) -> Result<Self, RayError> {
+    fn new(file: String, header: &Row) -> Result<Self, RayError> {
         let mut index = [None; 8];
-        let names: Vec<_> = header.iter().map(String::from_utf8_lossy).collect();
+        let text = String::from_utf8_lossy(&header.text);
+        let text = text.trim_start_matches('\u{feff}'); // as spreadsheets begin a file
+        let names: Vec<_> = text.split(',').map(str::trim).collect();
         for (position, name) in names.iter().enumerate() {
             let slot = COLUMNS.iter().position(|column| column == name);
             let found = match slot {
@@ -139,8 +199,7 @@ impl Layout {
                     continue;
                 }
                 Some(_) => format!("the column {name} twice"),
-                None if header.len() == 1 => format!("the single column {name:?}"),
-                None => format!("the column {name:?}"),
+                None => format!("the column {}", show(name.as_bytes())),
             };
             return Err(RayError::Header { file, found });
         }
@@ -150,89 +209,96 @@ impl Layout {
         }
         Ok(Self {
             file,
-            columns: header.len(),
+            columns: names.len(),
             index,
         })
     }
 
     /// The ray of one row.
-    pub fn ray(&self, row: &ByteRecord) -> Result<Ray, RayError> {
-        if row.len() != self.columns {
-            return Err(RayError::Fields {
-                file: self.file.clone(),
-                line: line(row),
-                found: row.len(),
-                expected: self.columns,
-            });
-        }
+    pub fn ray(&self, row: &Row) -> Result<Ray, RayError> {
+        let fields = self.fields(row)?;
         let mut origin = [0.0; 3];
         let mut direction = [0.0; 3];
         for axis in 0..3 {
-            origin[axis] = self.finite(row, axis)?;
-            direction[axis] = self.finite(row, 3 + axis)?;
+            origin[axis] = self.finite(row, &fields, axis)?;
+            direction[axis] = self.finite(row, &fields, 3 + axis)?;
         }
         let [dx, dy, dz] = direction;
         if direction == [0.0; 3] {
             let found = format!("{dx},{dy},{dz}");
             return Err(self.value(row, "dx,dy,dz", found, "a direction that is not zero"));
         }
-        let (tnear, tfar) = self.interval(row)?;
+        let (tnear, tfar) = self.interval(row, &fields)?;
         Ok(Ray {
             tnear,
             tfar,
-            ..Ray::new(origin.into(), Vec3::new(dx, dy, dz))
+            ..Ray::new(origin.into(), direction.into())
         })
     }
 
+    /// The fields in the order of [`COLUMNS`]; empty where the table has no such column.
+    fn fields<'r>(&self, row: &'r Row) -> Result<[&'r [u8]; 8], RayError> {
+        let mut found = 0;
+        let mut all: [&[u8]; 8] = [b""; 8];
+        for field in row.fields() {
+            if let Some(slot) = all.get_mut(found) {
+                *slot = field;
+            }
+            found += 1;
+        }
+        if found != self.columns {
+            return Err(RayError::Fields {
+                file: self.file.clone(),
+                line: row.line,
+                found,
+                expected: self.columns,
+            });
+        }
+        // A header has at most 8 columns: none is unknown, none comes twice.
+        Ok(self.index.map(|index| index.map_or(&b""[..], |i| all[i])))
+    }
+
     /// `tnear` and `tfar`; 0 and infinity where the column is missing or its field empty.
-    fn interval(&self, row: &ByteRecord) -> Result<(f32, f32), RayError> {
+    fn interval(&self, row: &Row, fields: &[&[u8]; 8]) -> Result<(f32, f32), RayError> {
         let [near, far] = [6, 7];
-        let tnear = match self.field(row, near) {
+        let tnear = match fields[near] {
             b"" => 0.0,
-            _ => self.finite(row, near)?,
+            _ => self.finite(row, fields, near)?,
         };
         if tnear < 0.0 {
             let found = tnear.to_string();
             return Err(self.value(row, COLUMNS[near], found, "a number of at least 0"));
         }
-        let text = self.field(row, far);
-        let tfar = match text {
+        let tfar = match fields[far] {
             b"" => Some(f32::INFINITY),
-            _ => number(text),
+            text => number(text),
         };
         match tfar.filter(|&t| t >= tnear) {
             Some(tfar) => Ok((tnear, tfar)),
             None => {
                 let expected = "a number of at least tnear, or inf";
-                Err(self.value(row, COLUMNS[far], show(text), expected))
+                Err(self.value(row, COLUMNS[far], show(fields[far]), expected))
             }
         }
     }
 
-    fn finite(&self, row: &ByteRecord, column: usize) -> Result<f32, RayError> {
-        let text = self.field(row, column);
+    fn finite(&self, row: &Row, fields: &[&[u8]; 8], column: usize) -> Result<f32, RayError> {
+        let text = fields[column];
         number(text)
             .filter(|x| x.is_finite())
             .ok_or_else(|| self.value(row, COLUMNS[column], show(text), "a finite number"))
     }
 
-    /// The field of a column; empty where the table has no such column.
-    fn field<'r>(&self, row: &'r ByteRecord, column: usize) -> &'r [u8] {
-        self.index[column]
-            .and_then(|i| row.get(i))
-            .unwrap_or_default()
-    }
-
     fn value(
         &self,
-        row: &ByteRecord,
+        row: &Row,
         column: &'static str,
         found: String,
         expected: &'static str,
     ) -> RayError {
         RayError::Value {
             file: self.file.clone(),
-            line: line(row),
+            line: row.line,
             column,
             found,
             expected,
@@ -251,24 +317,15 @@ fn show(text: &[u8]) -> String {
     }
 }
 
-fn line(row: &ByteRecord) -> u64 {
-    row.position().map_or(0, csv::Position::line)
-}
-
-fn read_error(file: &str, error: csv::Error) -> RayError {
-    RayError::Read {
-        file: file.to_owned(),
-        source: error.into(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
 
     fn read(table: &'static str) -> Result<Vec<Ray>, RayError> {
         let mut reader = RayReader::new("rays.csv".into(), Box::new(table.as_bytes()))?;
-        let mut rows = vec![ByteRecord::new(); 3];
+        let mut rows = vec![Row::default(); 3];
         let mut rays = Vec::new();
         loop {
             let count = reader.read(&mut rows)?;
@@ -287,7 +344,8 @@ mod tests {
 
     #[test]
     fn columns_come_in_any_order_and_the_interval_is_optional() {
-        let rays = read("dx,dy,dz,ox,oy,oz\n0,0,-2, 1,2,3\r\n\n1e-3,0,0,-1,0,0.5\n").unwrap();
+        let rays =
+            read("\u{feff}dx,dy,dz,ox,oy,oz\n0,0,-2, 1,2,3\r\n\n1e-3,0,0,-1,0,0.5\n").unwrap();
         assert_eq!(
             rays[0],
             Ray::new(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.0, -2.0))
@@ -310,10 +368,17 @@ mod tests {
     }
 
     #[test]
+    fn a_file_without_lines_is_refused() {
+        let zeros = Box::new(io::repeat(0));
+        let refused = RayReader::new("zeros".into(), zeros).err().unwrap();
+        assert!(matches!(refused, RayError::LongLine { line: 1, .. }));
+    }
+
+    #[test]
     fn headers_must_fit() {
         assert!(refusal("ox,oy,oz,dx,dy\n").contains("no column dz"));
         assert!(refusal("").contains("rays.csv:1: found no column ox"));
-        assert!(refusal("ox,oy,oz,dx,dy,dz,time\n").contains("\"time\""));
+        assert!(refusal("ox,oy,oz,dx,dy,dz,time\n").contains("the column time"));
         assert!(refusal("ox,ox,oy,oz,dx,dy,dz\n").contains("ox twice"));
     }
 
@@ -328,7 +393,7 @@ mod tests {
             ("ox,oy,oz,dx,dy,dz\n0,0,0,1,-inf,0\n", ":2: dy: found -inf"),
             ("ox,oy,oz,dx,dy,dz\n0,0,0,1,1e99,0\n", ":2: dy: found 1e99"),
             (
-                "ox,oy,oz,dx,dy,dz\n\n0,zero,0,1,0,0\n",
+                "ox,oy,oz,dx,dy,dz\r\n\r\n0,zero,0,1,0,0",
                 ":3: oy: found zero",
             ),
             ("ox,oy,oz,dx,dy,dz\n0,,0,1,0,0\n", ":2: oy: found nothing"),

@@ -78,11 +78,11 @@ pub struct Job<'a> {
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.check_backend()?;
-    let default_output = || PathBuf::from(args.scene.file_stem().unwrap_or_default());
-    let output = match &args.output {
-        Some(output) => output.clone(),
-        None => default_output().with_added_extension("png"),
-    };
+    let output = args.output.clone().unwrap_or_else(|| {
+        let mut name = args.scene.file_stem().unwrap_or_default().to_owned();
+        name.push(".png");
+        name.into()
+    });
     let target = Target::new(&output)?;
     if let Some(stats) = &args.stats {
         atomic::check(stats)?;

@@ -97,14 +97,6 @@ pub fn gradient3(seed: u32, p: Vec3) -> f32 {
     mix(face(0), face(1), w)
 }
 
-/// Value noise in the plane, [0, 1): softer and blotchier than gradient noise, half its price.
-pub fn value2(seed: u32, p: Vec2) -> f32 {
-    let ((x, fx), (y, fy)) = (split(p.x), split(p.y));
-    let corner = |i: i32, j: i32| unit(hash(seed, x + i, y + j, 0));
-    let edge = |j| mix(corner(0, j), corner(1, j), fade(fx));
-    mix(edge(0), edge(1), fade(fy))
-}
-
 /// Octaves of a noise: each next one at twice the frequency and `gain` times the amplitude.
 #[derive(Clone, Copy, Debug)]
 pub struct Octaves {
@@ -154,11 +146,6 @@ pub fn fbm2(seed: u32, p: Vec2, octaves: Octaves) -> f32 {
 /// Ridged fractal noise in space, [0, 1]: sharp crests at 1, round valleys.
 pub fn ridged3(seed: u32, p: Vec3, octaves: Octaves) -> f32 {
     octaves.sum(|i, f| crest(gradient3(seed.wrapping_add(i), f * p + SHIFT * i as f32)))
-}
-
-/// Ridged fractal noise in the plane, [0, 1].
-pub fn ridged2(seed: u32, p: Vec2, octaves: Octaves) -> f32 {
-    octaves.sum(|i, f| crest(gradient2(seed.wrapping_add(i), f * p + SHIFT * i as f32)))
 }
 
 /// What cellular noise knows of a point. Feature points are jittered, one in each unit cell.
@@ -284,7 +271,6 @@ mod tests {
             assert_eq!(gradient3(1, p.round()), 0.0);
             assert!(gradient3(1, p).abs() <= 1.1);
             assert!((0.0..=1.0).contains(&ridged3(1, p, Octaves::new(4))));
-            assert!((0.0..1.0).contains(&value2(1, p.truncate())));
         }
     }
 

@@ -111,7 +111,7 @@ fn ornament(longitude: f32, latitude: f32, p: Vec3) -> f32 {
     match above {
         a if a < 13.2 => raise(plait(longitude, latitude)),
         a if a < 18.2 => {}
-        a if a < 49.6 => raise(medallions(longitude, above, p)),
+        a if a < 49.6 => raise(medallions(longitude, p)),
         a if a < 55.0 => raise(rope(longitude, above, 52.3, 2.1, 96.0)),
         a if a < 74.0 => raise(lobes(longitude, above)),
         _ => raise(crown(longitude, above)),
@@ -243,7 +243,7 @@ fn crown(longitude: f32, latitude: f32) -> f32 {
 }
 
 /// Ten medallions on each side of the equator, two designs in turn, palmettes in the gaps.
-fn medallions(longitude: f32, latitude: f32, p: Vec3) -> f32 {
+fn medallions(longitude: f32, p: Vec3) -> f32 {
     const COUNT: f32 = 10.0;
     const MIDDLE: f32 = 33.5;
     const RADIUS: f32 = 13.4;
@@ -360,12 +360,19 @@ fn gilding(st: Vec2, cavity: &Cavity) -> Vec3 {
     let uneven = fbm3(21, 7.0 * p, Octaves::new(4));
     let relief = cavity.relief(st) + 0.03 * uneven;
     let height = cavity.height(st);
-    let shade = mix(0.85, 1.15, smoothstep(-0.4, 0.5, fbm3(22, 30.0 * p, Octaves::new(3))));
+    let shade = mix(
+        0.85,
+        1.15,
+        smoothstep(-0.4, 0.5, fbm3(22, 30.0 * p, Octaves::new(3))),
+    );
     let mut color = gold * shade;
     let hollow = smoothstep(0.02, -0.14, relief).max(smoothstep(0.3, 0.14, height));
     color = color.lerp(dark, 0.85 * hollow);
     color = color.lerp(patina, 0.75 * hollow * smoothstep(-0.1, 0.35, uneven));
-    color.lerp(bole, 0.7 * smoothstep(0.33, 0.5, uneven) * smoothstep(0.0, 0.08, relief))
+    color.lerp(
+        bole,
+        0.7 * smoothstep(0.33, 0.5, uneven) * smoothstep(0.0, 0.08, relief),
+    )
 }
 
 fn scene(scale: f32, midlevel: f32) -> String {
@@ -377,6 +384,7 @@ fov = 33.0
 
 [film]
 spp = 16
+exposure = 0.3
 
 [[mesh]]
 file = "orb.obj"
@@ -406,7 +414,7 @@ roughness = 0.25
 [[light]]
 type = "sun"
 elevation = 38.0
-azimuth = 50.0
+azimuth = 28.0
 
 [[light]]
 type = "sky"

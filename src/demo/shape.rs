@@ -19,12 +19,6 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// The whole map.
-    pub const FULL: Self = Self {
-        min: Vec2::ZERO,
-        max: Vec2::ONE,
-    };
-
     /// Cell `index` (row by row from the bottom) of a map cut into `per_side` x `per_side` cells, less
     /// `gutter` texels on every side; the border runs through the centres of the first texels kept.
     ///
@@ -108,29 +102,6 @@ pub fn add_grid(
         }
     }
     chart
-}
-
-/// Adds a tube of `sides` x (`path.len()` - 1) quads: u runs around it, v along the path.
-///
-/// `radius` is given the fraction of the path in [0, 1] and the angle in [0, 2 pi). Frames are carried along without
-/// twist; the first and the last column have the same positions bit for bit. The path has at least two
-/// points, no two neighbours equal.
-pub fn add_tube(
-    mesh: &mut MeshBuilder,
-    path: &[Vec3],
-    sides: usize,
-    rect: Rect,
-    radius: impl Fn(f32, f32) -> f32,
-) -> Chart {
-    let frames = frames_along(path);
-    let last = path.len() - 1;
-    add_grid(mesh, (sides, last), rect, |uv| {
-        let row = (uv.y * last as f32).round() as usize;
-        let side = (uv.x * sides as f32).round() as usize % sides;
-        let angle = std::f32::consts::TAU * side as f32 / sides as f32;
-        let (right, up) = frames[row];
-        path[row] + radius(uv.y, angle) * (right * angle.cos() + up * angle.sin())
-    })
 }
 
 /// (right, up) across each point of a path, carried along by the smallest rotation; right x up is forward.
@@ -222,27 +193,6 @@ pub fn position_key(p: Vec3) -> [u32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_tube_is_closed_round_and_faces_outward() {
-        let path: Vec<Vec3> = (0..9)
-            .map(|i| Vec3::new(0.3 * i as f32, (0.5 * i as f32).sin(), 0.1 * i as f32))
-            .collect();
-        let mut mesh = MeshBuilder::default();
-        let chart = add_tube(&mut mesh, &path, 12, Rect::FULL, |_, _| 0.2);
-        smooth_normals(&mut mesh);
-        assert_eq!(mesh.triangles.len(), 2 * 12 * 8);
-        for j in 0..=8 {
-            let (a, b) = (chart.vertex(0, j), chart.vertex(12, j));
-            assert_eq!(mesh.positions[a], mesh.positions[b]);
-            assert_eq!(mesh.normals[a], mesh.normals[b]);
-            for i in 0..=12 {
-                let out = mesh.positions[chart.vertex(i, j)] - path[j];
-                assert!((out.length() - 0.2).abs() < 1e-5);
-                assert!(out.dot(mesh.normals[chart.vertex(i, j)]) > 0.1);
-            }
-        }
-    }
 
     #[test]
     fn base_points_lie_on_the_triangles() {

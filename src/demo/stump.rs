@@ -272,11 +272,12 @@ fn ripple(around: Vec2) -> f32 {
 /// Bark: long plates parted by furrows that meet and part, cross-cracked, fibrous.
 fn bark(around: Vec2, t: f32) -> f32 {
     let q = around.extend(0.21 * t);
-    let bent = q + 0.012 * Vec3::new(
-        fbm3(31, 14.0 * q, Octaves::new(2)),
-        fbm3(32, 14.0 * q, Octaves::new(2)),
-        0.0,
-    );
+    let bent = q + 0.012
+        * Vec3::new(
+            fbm3(31, 14.0 * q, Octaves::new(2)),
+            fbm3(32, 14.0 * q, Octaves::new(2)),
+            0.0,
+        );
     // Furrows are the zeros of noise drawn out along the trunk.
     let furrow = |seed: u32, scale: Vec3| gradient3(seed, bent * scale).abs();
     let wide = smoothstep(0.01, 0.20, furrow(33, Vec3::new(34.0, 34.0, 11.0)));
@@ -344,10 +345,17 @@ fn cut(angle: f32, r: f32) -> f32 {
     let hinge = behind_hinge(p);
     let across = p.dot(Vec2::new(0.57, 0.82));
     let along = p.dot(Vec2::new(0.82, -0.57));
-    let saw = 0.0035 * fbm2(53, Vec2::new(75.0 * across + 4.0 * along * along, 5.0 * along), Octaves::new(2));
+    let saw = 0.0035
+        * fbm2(
+            53,
+            Vec2::new(75.0 * across + 4.0 * along * along, 5.0 * along),
+            Octaves::new(2),
+        );
     let step = -0.022 * smoothstep(0.02, -0.02, hinge);
     let rough = 0.003 * fbm2(54, 60.0 * p, Octaves::new(2));
-    LEVEL + worn + free * (saw + step + rough + splinters(hinge, along) - 0.035 * splits(angle, r, p))
+    LEVEL
+        + worn
+        + free * (saw + step + rough + splinters(hinge, along) - 0.035 * splits(angle, r, p))
 }
 
 /// Torn fibres standing along the hinge.
@@ -366,28 +374,38 @@ fn splinters(hinge: f32, along: f32) -> f32 {
 /// Drying cracks that open towards the bark, 1 in their depth.
 fn splits(angle: f32, r: f32, p: Vec2) -> f32 {
     let wander = 0.16 * fbm2(57, 4.0 * p, Octaves::new(3));
-    [(0.4, 0.25, 0.05), (1.9, 0.5, 0.03), (2.7, 0.12, 0.055), (4.1, 0.4, 0.035), (5.4, 0.2, 0.045)]
-        .iter()
-        .map(|&(at, from, width): &(f32, f32, f32)| {
-            let off = (angle + wander - at + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
-            let open = width * ((r - from) / (1.0 - from)).max(0.0).powf(0.6);
-            smoothstep(open + 0.004, 0.3 * open, off.abs()) * smoothstep(from, from + 0.08, r)
-        })
-        .fold(0.0, f32::max)
+    [
+        (0.4, 0.25, 0.05),
+        (1.9, 0.5, 0.03),
+        (2.7, 0.12, 0.055),
+        (4.1, 0.4, 0.035),
+        (5.4, 0.2, 0.045),
+    ]
+    .iter()
+    .map(|&(at, from, width): &(f32, f32, f32)| {
+        let off = (angle + wander - at + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+        let open = width * ((r - from) / (1.0 - from)).max(0.0).powf(0.6);
+        smoothstep(open + 0.004, 0.3 * open, off.abs()) * smoothstep(from, from + 0.08, r)
+    })
+    .fold(0.0, f32::max)
 }
 
 fn bark_color(around: Vec2, t: f32, relief: f32) -> Vec3 {
     let q = around.extend(0.21 * t);
     let mottle = fbm3(61, 30.0 * q, Octaves::new(4));
     let furrow = Vec3::new(0.035, 0.020, 0.013);
-    let plate = Vec3::new(0.20, 0.145, 0.105).lerp(Vec3::new(0.30, 0.26, 0.215), smoothstep(-0.3, 0.4, mottle));
+    let plate = Vec3::new(0.27, 0.20, 0.145)
+        .lerp(Vec3::new(0.40, 0.345, 0.285), smoothstep(-0.3, 0.4, mottle));
     let mut color = furrow.lerp(plate, smoothstep(-0.13, 0.10, relief));
     let lichen = fbm3(62, 55.0 * q, Octaves::new(3));
     color = color.lerp(
         Vec3::new(0.42, 0.44, 0.34),
         0.7 * smoothstep(0.28, 0.42, lichen) * smoothstep(-0.02, 0.06, relief),
     );
-    let green = Vec3::new(0.045, 0.075, 0.014).lerp(Vec3::new(0.15, 0.19, 0.035), smoothstep(-0.4, 0.5, lichen + 3.0 * relief));
+    let green = Vec3::new(0.045, 0.075, 0.014).lerp(
+        Vec3::new(0.15, 0.19, 0.035),
+        smoothstep(-0.4, 0.5, lichen + 3.0 * relief),
+    );
     color.lerp(green, 0.92 * moss(q, t))
 }
 
@@ -402,8 +420,19 @@ fn cut_color(angle: f32, r: f32, relief: f32) -> Vec3 {
     let dark = Vec3::new(0.28, 0.13, 0.05);
     let mut color = pale.lerp(dark, 0.75 * late * strength);
     let grime = fbm2(66, 5.0 * p, Octaves::new(4));
-    color = color.lerp(Vec3::new(0.30, 0.27, 0.23), 0.55 * smoothstep(0.0, 0.4, grime));
-    color *= mix(0.85, 1.1, smoothstep(-0.4, 0.4, fbm2(67, Vec2::new(90.0 * p.x, 90.0 * p.y), Octaves::new(2))));
+    color = color.lerp(
+        Vec3::new(0.30, 0.27, 0.23),
+        0.55 * smoothstep(0.0, 0.4, grime),
+    );
+    color *= mix(
+        0.85,
+        1.1,
+        smoothstep(
+            -0.4,
+            0.4,
+            fbm2(67, Vec2::new(90.0 * p.x, 90.0 * p.y), Octaves::new(2)),
+        ),
+    );
     let pith = smoothstep(0.02, 0.012, r);
     let hollow = smoothstep(-0.02, -0.12, relief);
     color.lerp(Vec3::new(0.04, 0.025, 0.015), hollow.max(0.8 * pith))
@@ -414,10 +443,11 @@ fn scene(scale: f32, midlevel: f32) -> String {
         r#"[camera]
 position = [0.6, 2.15, 3.7]
 target = [0.0, 0.42, 0.0]
-fov = 36.0
+fov = 32.0
 
 [film]
 spp = 16
+exposure = 0.6
 
 [[mesh]]
 file = "stump.obj"
@@ -447,7 +477,7 @@ specular = 0.2
 [[light]]
 type = "sun"
 elevation = 36.0
-azimuth = 75.0
+azimuth = 40.0
 
 [[light]]
 type = "sky"

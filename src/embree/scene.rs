@@ -213,9 +213,10 @@ impl SceneBuilder {
                 instance.commit()?;
             }
         }
+        let raw = self.raw.0.as_ptr();
         // SAFETY: a live scene, exclusively borrowed: nobody traces it.
-        self.device
-            .guarded(|| unsafe { sys::pm_scene_commit(self.raw.0.as_ptr()) })?;
+        let built = self.device.guarded(|| unsafe { sys::pm_scene_commit(raw) });
+        built?;
         self.device.check()
     }
 }

@@ -88,7 +88,7 @@ pub fn write(
     }
 }
 
-/// Fails now if [`write`] to this path would fail for its name, its folder or permissions.
+/// Fails now if [`write()`] to this path would fail for its name, its folder or permissions.
 pub fn check(path: &Path) -> Result<(), OutputError> {
     let (target, folder) = resolve(path)?;
     match temporary_file(&target, &folder) {

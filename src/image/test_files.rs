@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use image::{DynamicImage, ImageFormat};
 use tempfile::TempDir;
 
+/// A channel's name and samples, top row first.
+pub type NamedSamples<'a> = (&'a str, exr::prelude::FlatSamples);
+
 /// A folder that lives as long as the test.
 pub struct Folder(TempDir);
 
@@ -41,12 +44,12 @@ impl Folder {
         path
     }
 
-    /// Layers of (name, channels of (name, samples, top row first)).
+    /// Layers of (name, channels).
     pub fn exr(
         &self,
         size: (usize, usize),
         compression: exr::prelude::Compression,
-        layers: Vec<(Option<&str>, Vec<(&str, exr::prelude::FlatSamples)>)>,
+        layers: Vec<(Option<&str>, Vec<NamedSamples>)>,
     ) -> PathBuf {
         use exr::prelude::*;
         let path = self.path("picture.exr");

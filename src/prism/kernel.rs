@@ -28,11 +28,11 @@ impl Kernel {
     pub fn new(level: SimdLevel) -> Self {
         #[cfg(target_arch = "x86_64")]
         if level == SimdLevel::Avx2 && level.is_supported() {
-            // SAFETY: the machine supports AVX2 and FMA.
-            return Self {
-                level,
-                first_root: |p, prim, ray| unsafe { first_root_avx2(p, prim, ray) },
+            let first_root: fn(&Prisms, u32, &Ray) -> Option<Root> = |prisms, prim, ray| {
+                // SAFETY: the machine supports AVX2 and FMA, or this function would not have been chosen.
+                unsafe { first_root_avx2(prisms, prim, ray) }
             };
+            return Self { level, first_root };
         }
         Self {
             level: SimdLevel::Baseline,

@@ -3,8 +3,8 @@
 //! R. Hoetzlein, "Projective Displacement Mapping for Ray Traced Editable Surfaces", Computer Graphics Forum 44(7),
 //! 2025, doi 10.1111/cgf.70235.
 //!
-//! A ray that enters a prism's box is clipped to slabs ([`frame`], [`path`]), then to the prism's sides
-//! ([`sides`]); along what is left the surface is looked for ([`march`]), and the crossing is polished on the
+//! A ray that enters a prism's box is clipped to slabs (`frame`, `path`), then to the prism's sides
+//! (`sides`); along what is left the surface is looked for (`march`), and the crossing is polished on the
 //! surface's definition ([`crate::surface`]). This room knows no Embree, no scene and no picture.
 
 mod frame;

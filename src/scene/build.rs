@@ -22,7 +22,7 @@ use super::{Camera, Color, Film, Light, Material, ObjectShape, Scene, SceneObjec
 use crate::image::{Channel, ColorSpace};
 use crate::prism::March;
 use crate::surface::{
-    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode,
+    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Projection,
     UvTransform, Wrap,
 };
 use assets::Assets;
@@ -52,6 +52,8 @@ pub struct Loaded {
 pub struct MeshAndMap {
     /// The mesh file; all its parts are taken.
     pub mesh: PathBuf,
+    /// Texture coordinates instead of the file's.
+    pub texcoords: Option<Projection>,
     /// The displacement map.
     pub map: PathBuf,
     /// Which channel of it.
@@ -91,6 +93,9 @@ impl Loaded {
         let map = builder.assets.heights(map, &source.channel, source.wrap)?;
         let mut file = load_mesh(mesh)?;
         builder.warn_all(mesh, std::mem::take(&mut file.warnings));
+        if let Some(projection) = source.texcoords {
+            file.project(projection);
+        }
         let name = stem(mesh);
         let whole = file.into_single_mesh();
         let whole = builder.base_mesh(mesh, &name, whole, &Shaping::default())?;
@@ -147,7 +152,10 @@ impl Builder {
             recompute_normals: table.recompute_normals,
             crease_angle: table.crease_angle,
         };
-        let loaded = load_mesh(path).map_err(|e| asset(e.into()))?;
+        let mut loaded = load_mesh(path).map_err(|e| asset(e.into()))?;
+        if let Some(projection) = table.texcoords {
+            loaded.project(projection);
+        }
         self.warn_all(path, loaded.warnings);
         let single = loaded.parts.len() == 1;
         let mut of_file = HashMap::new();

@@ -82,7 +82,7 @@ pub enum SceneError {
     #[error("{place}: {message}{}", place.snippet())]
     Syntax {
         /// Where.
-        place: Place,
+        place: Box<Place>,
         /// What the TOML parser says.
         message: String,
     },
@@ -90,7 +90,7 @@ pub enum SceneError {
     #[error("{place}: {key}: found {found}; expected {expected}{}", place.snippet())]
     Value {
         /// Where.
-        place: Place,
+        place: Box<Place>,
         /// Full name of the key, like `mesh[0].displacement.scale`.
         key: String,
         /// What the file has.
@@ -102,11 +102,11 @@ pub enum SceneError {
     #[error("{place}: {key}: {source}{}", place.snippet())]
     Asset {
         /// Where the scene names it.
-        place: Place,
+        place: Box<Place>,
         /// Full name of the key.
         key: String,
         /// Why.
-        source: AssetError,
+        source: Box<AssetError>,
     },
 }
 

@@ -35,7 +35,9 @@ pub enum SurfaceError {
     /// The mesh has no texture coordinates.
     #[error(
         "the mesh has no texture coordinates, so the map cannot be laid on it; \
-         unwrap it in a modelling program and export it with UVs"
+         unwrap it in a modelling program and export it with UVs, or have some made: \
+         texcoords = \"box\", \"spherical\", \"cylindrical\" or \"planar\" in the scene's [[mesh]], \
+         --texcoords on the command line"
     )]
     MissingTexcoords,
     /// NaN, infinite or zero where a number is needed.

@@ -214,7 +214,7 @@ impl MeshBuilder {
         self.triangles.extend(shifted);
     }
 
-    fn validate(&self) -> Result<(), MeshError> {
+    pub(super) fn validate(&self) -> Result<(), MeshError> {
         let vertices = self.positions.len();
         let sizes = [
             ("vertices", vertices, u32::MAX as usize),

@@ -16,6 +16,7 @@ mod map;
 mod mesh;
 mod normals;
 mod patch;
+mod projection;
 mod uv;
 
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
@@ -23,4 +24,5 @@ pub use map::{DisplacementMap, HeightSample, MapError, Texels};
 pub use mesh::{BaseMesh, MeshBuilder, MeshError, MeshReport, NormalMode};
 pub(crate) use patch::solve;
 pub use patch::{Patch, PatchPoint};
+pub use projection::Projection;
 pub use uv::{UvTransform, Wrap};

@@ -1,4 +1,5 @@
 //! Runs the program in a folder of its own.
+#![allow(dead_code)] // each test program uses its own part
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -31,7 +32,6 @@ scale = 0.2
 ";
 
 /// What the height 32768 of `flat.png` displaces by under the scale of [`SCENE`].
-#[allow(dead_code)] // not every test program asks
 pub const FLAT: f64 = 0.2 * 32768.0 / 65535.0;
 
 pub struct Folder(TempDir);
@@ -59,7 +59,6 @@ impl Folder {
         std::fs::write(self.path(name), bytes).unwrap();
     }
 
-    #[allow(dead_code)] // not every test program asks
     pub fn text(&self, name: &str) -> String {
         std::fs::read_to_string(self.path(name)).unwrap()
     }
@@ -86,7 +85,6 @@ impl Folder {
 
     /// Runs the program here, unable to write files of more than 512 bytes: what a full disk does, without one.
     #[cfg(unix)]
-    #[allow(dead_code)] // not every test program asks
     pub fn run_on_full_disk(&self, arguments: &[&str]) -> Output {
         let mut shell = Command::new("sh");
         // An ignored signal stays ignored: the write fails instead of ending the program.

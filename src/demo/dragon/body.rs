@@ -103,7 +103,10 @@ impl Spine {
             for s in 0..FINE {
                 let x = s as f32 / FINE as f32;
                 let p = [at(i - 1), at(i), at(i + 1), at(i + 2)];
-                points.push((catmull_rom(p.map(|k| k.0), x), catmull_rom(p.map(|k| k.1), x)));
+                points.push((
+                    catmull_rom(p.map(|k| k.0), x),
+                    catmull_rom(p.map(|k| k.1), x),
+                ));
             }
         }
         points.push(at(knots.len() as isize - 1));
@@ -243,9 +246,8 @@ pub(super) struct Spike {
 impl Spike {
     /// Adds 2 * `around` * `rings` triangles. The tip is blunt, as a vertex normal must not stray from its faces.
     pub fn add(&self, sweep: &mut Sweep) {
-        let axis = |x: f32| {
-            self.root.origin + self.length * (x * self.root.forward + x * x * self.bend)
-        };
+        let axis =
+            |x: f32| self.root.origin + self.length * (x * self.root.forward + x * x * self.bend);
         let rings: Vec<Vec<Vec3>> = (0..self.rings)
             .map(|k| {
                 let x = 0.97 * k as f32 / (self.rings - 1) as f32;
@@ -256,7 +258,11 @@ impl Spike {
             .collect();
         let thin = self.half.min_element();
         let back = self.root.origin - 0.5 * thin * self.root.forward;
-        let frame = Frame::new(axis(0.97), self.root.forward + 1.94 * self.bend, self.root.up);
+        let frame = Frame::new(
+            axis(0.97),
+            self.root.forward + 1.94 * self.bend,
+            self.root.up,
+        );
         let tip = frame.origin + (0.11 * thin).max(0.03 * self.length) * frame.forward;
         sweep.closed_tube(back, &rings, tip, trim_chart(self.trim));
     }
@@ -343,7 +349,12 @@ fn add_leg(sweep: &mut Sweep, body: &Frame, r: f32, size: f32, hand: f32) {
         .collect();
     let foot = Frame::new(points[last], along(last), body.up);
     let start = points[0] - 0.03 * size * along(0).normalize();
-    sweep.closed_tube(start, &rings, foot.point(Vec3::new(0.0, 0.0, 0.03 * size)), chart(Band::Tail(0)));
+    sweep.closed_tube(
+        start,
+        &rings,
+        foot.point(Vec3::new(0.0, 0.0, 0.03 * size)),
+        chart(Band::Tail(0)),
+    );
     for toe in [-0.9f32, -0.3, 0.3, 0.9] {
         let forward = foot.vector(Vec3::new(toe.sin(), 0.15, toe.cos()));
         Spike {
@@ -360,7 +371,14 @@ fn add_leg(sweep: &mut Sweep, body: &Frame, r: f32, size: f32, hand: f32) {
 }
 
 /// Adds a ball of exactly `triangles` triangles (even, at least 60); its axis is `axis`.
-pub(super) fn add_ball(sweep: &mut Sweep, center: Vec3, radius: f32, axis: Vec3, triangles: usize, trim: Trim) {
+pub(super) fn add_ball(
+    sweep: &mut Sweep,
+    center: Vec3,
+    radius: f32,
+    axis: Vec3,
+    triangles: usize,
+    trim: Trim,
+) {
     let points = triangles / 2;
     let count = ((points as f32 / 2.0).sqrt() as usize).max(3);
     let latitude = |k: usize| PI * (k as f32 + 1.0) / (count as f32 + 1.0);
@@ -369,11 +387,24 @@ pub(super) fn add_ball(sweep: &mut Sweep, center: Vec3, radius: f32, axis: Vec3,
     let rings: Vec<Vec<Vec3>> = (0..count)
         .map(|k| {
             wanted += points as f32 * latitude(k).sin() / total;
-            let around = if k + 1 == count { points - given } else { (wanted.round() as usize - given).max(3) };
+            let around = if k + 1 == count {
+                points - given
+            } else {
+                (wanted.round() as usize - given).max(3)
+            };
             given += around;
-            let frame = Frame::new(center - radius * latitude(k).cos() * axis, axis, axis.any_orthogonal_vector());
+            let frame = Frame::new(
+                center - radius * latitude(k).cos() * axis,
+                axis,
+                axis.any_orthogonal_vector(),
+            );
             frame.ellipse(around, Vec2::splat(radius * latitude(k).sin()))
         })
         .collect();
-    sweep.closed_tube(center - radius * axis, &rings, center + radius * axis, trim_chart(trim));
+    sweep.closed_tube(
+        center - radius * axis,
+        &rings,
+        center + radius * axis,
+        trim_chart(trim),
+    );
 }

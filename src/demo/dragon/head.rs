@@ -59,9 +59,7 @@ pub(super) fn add_head(sweep: &mut Sweep, frame: &Frame, size: f32) {
 /// The station at `z`, smoothly between the given ones.
 fn station(profile: &[Station], z: f32) -> [f32; 3] {
     let last = profile.len() - 1;
-    let i = profile
-        .partition_point(|s| s[0] <= z)
-        .clamp(1, last);
+    let i = profile.partition_point(|s| s[0] <= z).clamp(1, last);
     let x = (z - profile[i - 1][0]) / (profile[i][0] - profile[i - 1][0]);
     let at = |k: usize| Vec3::new(profile[k][1], profile[k][2], profile[k][3]);
     catmull_rom(
@@ -128,7 +126,11 @@ impl Head<'_> {
             let bridge = 0.03 * bump(side, 0.05) * smoothstep(0.4, 0.6, p.z) * upper;
             let cheek = 0.05 * bump(p.z - 0.16, 0.09) * bump(p.y + 0.03, 0.07);
             let out = p.x.signum() * (cheek - socket + 0.4 * brow + 0.3 * nostril);
-            Vec3::new(p.x + if side > 0.01 { out } else { 0.0 }, p.y + brow + nostril + bridge, p.z)
+            Vec3::new(
+                p.x + if side > 0.01 { out } else { 0.0 },
+                p.y + brow + nostril + bridge,
+                p.z,
+            )
         };
         let rings: Vec<Vec<Vec3>> = (0..RINGS)
             .map(|k| {
@@ -164,9 +166,7 @@ impl Head<'_> {
 
     fn eye(&self, sweep: &mut Sweep, hand: f32) {
         let center = self.point(Vec3::new(0.165 * hand, 0.105, 0.415));
-        let gaze = self
-            .frame
-            .vector(Vec3::new(hand, 0.25, 0.55).normalize());
+        let gaze = self.frame.vector(Vec3::new(hand, 0.25, 0.55).normalize());
         add_ball(sweep, center, 0.058 * self.size, gaze, 160, Trim::Eye);
     }
 
@@ -186,9 +186,23 @@ impl Head<'_> {
         };
         let root = Vec3::new(0.12 * hand, 0.20, 0.12);
         let forward = Vec3::new(0.32 * hand, 0.62, -0.75);
-        spike(root, forward, Vec3::new(0.05 * hand, 0.35, -0.05), 0.78, 0.052, 10);
+        spike(
+            root,
+            forward,
+            Vec3::new(0.05 * hand, 0.35, -0.05),
+            0.78,
+            0.052,
+            10,
+        );
         let fork = root + 0.33 * forward.normalize() + Vec3::new(0.0, 0.05, 0.0);
-        spike(fork, Vec3::new(0.25 * hand, 1.0, -0.05), Vec3::new(0.0, 0.0, -0.3), 0.30, 0.034, 6);
+        spike(
+            fork,
+            Vec3::new(0.25 * hand, 1.0, -0.05),
+            Vec3::new(0.0, 0.0, -0.3),
+            0.30,
+            0.034,
+            6,
+        );
     }
 
     fn teeth(&self, sweep: &mut Sweep, hand: f32) {
@@ -204,11 +218,28 @@ impl Head<'_> {
             }
             .add(sweep);
         };
-        for (z, length) in [(0.46, 0.06), (0.56, 0.065), (0.66, 0.07), (0.76, 0.085), (0.86, 0.135), (0.94, 0.08)] {
+        for (z, length) in [
+            (0.46, 0.06),
+            (0.56, 0.065),
+            (0.66, 0.07),
+            (0.76, 0.085),
+            (0.86, 0.135),
+            (0.94, 0.08),
+        ] {
             let [width, _, below] = station(&SKULL, z);
-            tooth(Vec3::new(0.78 * width * hand, -0.6 * below, z), Vec3::new(0.08 * hand, -1.0, 0.1), length);
+            tooth(
+                Vec3::new(0.78 * width * hand, -0.6 * below, z),
+                Vec3::new(0.08 * hand, -1.0, 0.1),
+                length,
+            );
         }
-        for (z, length) in [(0.36, 0.055), (0.46, 0.06), (0.56, 0.065), (0.66, 0.12), (0.73, 0.07)] {
+        for (z, length) in [
+            (0.36, 0.055),
+            (0.46, 0.06),
+            (0.56, 0.065),
+            (0.66, 0.12),
+            (0.73, 0.07),
+        ] {
             let [width, above, _] = station(&JAW, z);
             let at = Self::hang(Vec3::new(0.78 * width * hand, 0.4 * above, z));
             tooth(at, Vec3::new(0.05 * hand, 1.0, 0.45), length);
@@ -264,7 +295,8 @@ impl Head<'_> {
 
     /// Two wreaths of flat spikes behind the cheeks and over the nape.
     fn mane(&self, sweep: &mut Sweep) {
-        for (row, (z, length, lift)) in [(0.06, 0.40, 0.75), (-0.10, 0.46, 0.55)].iter().enumerate() {
+        for (row, (z, length, lift)) in [(0.06, 0.40, 0.75), (-0.10, 0.46, 0.55)].iter().enumerate()
+        {
             let count = 9 - row;
             for k in 0..count {
                 let spread = 2.0 * (k as f32 + 0.5) / count as f32 - 1.0;
@@ -289,7 +321,13 @@ impl Head<'_> {
     }
 
     fn beard(&self, sweep: &mut Sweep) {
-        for (x, z, length) in [(0.0, 0.68, 0.30), (-0.05, 0.58, 0.24), (0.05, 0.58, 0.24), (-0.06, 0.45, 0.18), (0.06, 0.45, 0.18)] {
+        for (x, z, length) in [
+            (0.0, 0.68, 0.30),
+            (-0.05, 0.58, 0.24),
+            (0.05, 0.58, 0.24),
+            (-0.06, 0.45, 0.18),
+            (0.06, 0.45, 0.18),
+        ] {
             let at = Self::hang(Vec3::new(x, -0.03, z));
             Spike {
                 root: self.at(at, Vec3::new(1.5 * x, -0.9, -0.1), Vec3::Z),

@@ -63,16 +63,18 @@ fn mesh() -> MeshBuilder {
 fn scene(scale: f32, midlevel: f32) -> String {
     format!(
         r#"[camera]
-position = [-1.5, 1.75, 8.0]
-target = [0.08, 1.42, 0.0]
+position = [-1.5, 1.95, 8.0]
+target = [0.08, 1.56, 0.0]
 fov = 32.0
 
 [film]
 spp = 16
+exposure = 0.4
 
 [[mesh]]
 file = "dragon.obj"
 material = "scales"
+transform = {{ translate = [0.0, 0.22, 0.0] }}
 
 [mesh.displacement]
 map = "dragon_height.png"
@@ -97,7 +99,7 @@ roughness = 0.3
 [[light]]
 type = "sun"
 elevation = 42.0
-azimuth = 35.0
+azimuth = 325.0
 
 [[light]]
 type = "sky"

@@ -17,7 +17,8 @@ pub(super) fn height(st: Vec2) -> f32 {
     match band {
         Band::Body(variant) => RELIEF * segment(st.x, t, variant).0,
         Band::Tail(variant) => {
-            RELIEF * [0.55, 0.3][variant as usize] * segment(st.x, t, 3 + variant).0
+            let depth = [0.55, 0.3][variant as usize];
+            RELIEF * mix(NODE, segment(st.x, t, 3 + variant).0, depth)
         }
         Band::Skull => RELIEF * skull(st.x, t),
         Band::Jaw => RELIEF * jaw(st.x, t),
@@ -89,6 +90,8 @@ const SCALES_AROUND: i32 = 24;
 const SCALE_ROWS: f32 = 7.0;
 /// Half width of the belly, in u.
 const BELLY: f32 = 0.13;
+/// Height of the groove where two segments meet, whatever the depth of their patterns.
+const NODE: f32 = 0.12;
 /// Length of the collars at both ends of a segment, in t.
 const COLLAR: f32 = 0.12;
 
@@ -105,10 +108,13 @@ fn segment(u: f32, t: f32, seed: u32) -> (f32, Scale) {
     let x = smoothstep(BELLY + 0.012, BELLY - 0.012, off);
     let seam = 0.75 * round(off - BELLY, 0.018);
     let q = ring_point(u, 0.3 * t);
-    let rough = 0.035 * fbm3(seed + 71, 150.0 * q, Octaves::new(3))
-        + 0.06 * gradient3(seed + 72, 13.0 * q);
+    let rough =
+        0.035 * fbm3(seed + 71, 150.0 * q, Octaves::new(3)) + 0.06 * gradient3(seed + 72, 13.0 * q);
     let skin = mix(scale.height, plates, x).max(seam) + rough;
-    (collar(u, t).max(skin * smoothstep(0.05, 0.11, t.min(1.0 - t))), scale)
+    (
+        collar(u, t).max(skin * smoothstep(0.05, 0.11, t.min(1.0 - t))),
+        scale,
+    )
 }
 
 /// Broad plates across the belly, overlapping towards the tail.
@@ -126,12 +132,13 @@ fn collar(u: f32, t: f32) -> f32 {
     if d > COLLAR {
         return 0.0;
     }
-    let outer = 0.45 + 0.55 * round(d - 0.035, 0.022);
+    let outer = NODE + (1.0 - NODE) * round(d - 0.035, 0.022);
     let inner = 0.2 + 0.55 * round(d - 0.098, 0.014);
     let x = (u * 40.0).rem_euclid(1.0) - 0.5;
     let stud = 0.55 * round(x.hypot((d - 0.072) * 22.0), 0.36);
     let bed = 0.42 * smoothstep(COLLAR, COLLAR - 0.01, d);
-    (outer * smoothstep(0.062, 0.056, d)).max(inner * smoothstep(COLLAR, 0.11, d)).max(bed + stud * smoothstep(0.05, 0.06, d))
+    let inside = (bed + stud).max(inner * smoothstep(COLLAR, 0.11, d));
+    (outer * smoothstep(0.062, 0.056, d)).max(inside * smoothstep(0.050, 0.060, d))
 }
 
 /// The upper head: scales that shrink to wrinkles on the snout, brows, nostrils, a lip.
@@ -163,20 +170,22 @@ fn jaw(u: f32, t: f32) -> f32 {
     let floor = 0.3 + 0.1 * fbm3(96, 25.0 * q, Octaves::new(3));
     let lip = 0.75 * round(off - 0.30, 0.03);
     let skin = mix(below, floor, smoothstep(0.28, 0.33, off)).max(lip);
-    mix(0.3, skin + 0.05 * fbm3(97, 110.0 * q, Octaves::new(3)), ends(t))
+    mix(
+        0.3,
+        skin + 0.05 * fbm3(97, 110.0 * q, Octaves::new(3)),
+        ends(t),
+    )
 }
 
 /// 0 at both ends of a closed tube, where heights may depend on t alone.
 fn ends(t: f32) -> f32 {
-    smoothstep(0.015, 0.04, t) * smoothstep(0.985, 0.965, t)
+    smoothstep(0.04, 0.07, t) * smoothstep(0.985, 0.965, t)
 }
 
 /// Trims are turned on a lathe: heights depend on t alone.
 fn trim(trim: Trim, t: f32) -> f32 {
     match trim {
-        Trim::Horn => {
-            0.12 + 0.07 * (TAU * 13.0 * t).sin() * smoothstep(0.95, 0.6, t)
-        }
+        Trim::Horn => 0.12 + 0.07 * (TAU * 13.0 * t).sin() * smoothstep(0.95, 0.6, t),
         Trim::Spine => 0.08 + 0.05 * (TAU * 7.0 * t).cos() * smoothstep(0.9, 0.5, t),
         Trim::Whisker => 0.05 + 0.03 * (TAU * 24.0 * t).sin(),
         Trim::Eye => 0.1 + 0.22 * round(t - 1.0, 0.42),

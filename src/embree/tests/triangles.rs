@@ -55,7 +55,8 @@ fn triangles_have_masks_and_filters_too() {
         mask: 0b10,
         ..Ray::new((v0 + v1 + v2) / 3.0 - Vec3::Z * 20.0, Vec3::Z)
     };
-    let cases: [(fn(Geometry) -> Geometry, bool); 4] = [
+    type Change = fn(Geometry) -> Geometry;
+    let cases: [(Change, bool); 4] = [
         (|g| g.with_mask(0b10), true),
         (|g| g.with_mask(0b01), false),
         (|g| g.with_filter(Box::new(|_, hit| hit.prim == 5)), true),

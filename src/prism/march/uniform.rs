@@ -114,8 +114,12 @@ impl Field<'_> {
                 (LANES - 1) as f32 * longest_leg(x, y) / length
             }
         };
-        // NaN becomes 1.
-        steps.ceil().min(MOST_STEPS).max(1.0)
+        // NaN too becomes 1.
+        if steps > 1.0 {
+            steps.ceil().min(MOST_STEPS)
+        } else {
+            1.0
+        }
     }
 
     #[inline(always)]

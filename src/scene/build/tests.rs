@@ -152,3 +152,33 @@ fn the_world_keeps_the_order_of_objects() {
     assert_eq!(masks, [5, 5, u32::MAX, u32::MAX]);
     assert_eq!(world.top_level().len(), 2 + 4);
 }
+
+#[test]
+fn texture_coordinates_are_made_on_demand() {
+    let folder = folder();
+    let bare: String = OBJ
+        .lines()
+        .filter(|line| !line.starts_with("vt"))
+        .map(|line| line.replace("/1", "").replace("/2", "") + "\n")
+        .collect();
+    let bare = bare.replace("/3", "").replace("/4", "");
+    fs::write(folder.path().join("two.obj"), bare).unwrap();
+    let scene = |texcoords: &str| {
+        format!(
+            "[[mesh]]\nfile = \"two.obj\"\ntransform = {{ scale = 4 }}\n{texcoords}\n[mesh.displacement]\nscale = 1\n"
+        )
+    };
+    let missing = load(&folder, &scene("")).unwrap_err().to_string();
+    for known in ["box", "spherical", "cylindrical", "planar", "--texcoords"] {
+        assert!(missing.contains(known), "{missing}");
+    }
+    let unknown = load(&folder, &scene("texcoords = \"cubic\"")).unwrap_err();
+    assert!(unknown.to_string().contains("planar"), "{unknown}");
+    let loaded = load(&folder, &scene("texcoords = \"planar\"")).unwrap();
+    for object in &loaded.scene.objects {
+        let mesh = surface(object).mesh();
+        for (p, st) in mesh.positions().iter().zip(mesh.texcoords()) {
+            assert_eq!(*st, p.truncate() / 4.0);
+        }
+    }
+}

@@ -7,11 +7,20 @@ use glam::{Affine3A, EulerRot, Quat, Vec3};
 use super::{Item, Keyed, STEP_TEXELS, SceneError, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
 use crate::prism::{March, Step};
-use crate::surface::{UvTransform, Wrap};
+use crate::surface::{Projection, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
 pub(in crate::scene) const SCALE: &str =
     "world units from height 0 to height 1: a number other than 0";
+
+/// The words for where texture coordinates come from.
+const TEXCOORDS: [(&str, Option<Projection>); 5] = [
+    ("file", None),
+    ("box", Some(Projection::Box)),
+    ("spherical", Some(Projection::Spherical)),
+    ("cylindrical", Some(Projection::Cylindrical)),
+    ("planar", Some(Projection::Planar)),
+];
 
 /// One mesh as written.
 #[derive(Debug)]
@@ -23,6 +32,8 @@ pub(in crate::scene) struct MeshTable {
     pub recompute_normals: bool,
     /// Radians, for computed normals.
     pub crease_angle: f32,
+    /// Texture coordinates instead of the file's.
+    pub texcoords: Option<Projection>,
     pub material: Option<Keyed<String>>,
     pub mask: u32,
     pub transform: Affine3A,
@@ -52,6 +63,7 @@ impl MeshTable {
             "file",
             "normals",
             "crease_angle",
+            "texcoords",
             "material",
             "mask",
             "transform",
@@ -71,6 +83,9 @@ impl MeshTable {
                     i.number("degrees from 0 to 180", |x| (0.0..=180.0).contains(&x))
                 })?
                 .map_or(std::f32::consts::PI, f32::to_radians),
+            texcoords: section
+                .optional("texcoords", |i| i.word(&TEXCOORDS))?
+                .flatten(),
             material: section.optional("material", |i| {
                 Ok(keyed(&i, i.text("the name of a [[material]]")?.to_owned()))
             })?,

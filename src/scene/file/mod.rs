@@ -35,7 +35,7 @@ pub(super) struct SceneFile {
 pub(super) struct Keyed<T> {
     pub value: T,
     key: String,
-    place: Place,
+    place: Box<Place>,
 }
 
 impl<T> Keyed<T> {
@@ -54,7 +54,7 @@ impl<T> Keyed<T> {
         SceneError::Asset {
             place: self.place.clone(),
             key: self.key.clone(),
-            source: source.into(),
+            source: Box::new(source.into()),
         }
     }
 }

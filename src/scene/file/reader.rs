@@ -32,8 +32,8 @@ impl<'a> Source<'a> {
         Section::open(self, String::new(), 0..0, root.into_inner(), keys)
     }
 
-    fn place(self, span: Range<usize>) -> Place {
-        Place::new(self.file, self.text, span)
+    fn place(self, span: Range<usize>) -> Box<Place> {
+        Box::new(Place::new(self.file, self.text, span))
     }
 }
 
@@ -105,7 +105,7 @@ impl<'a> Section<'a> {
     }
 
     /// Where the table begins.
-    pub fn place(&self) -> Place {
+    pub fn place(&self) -> Box<Place> {
         self.source.place(self.span.clone())
     }
 }
@@ -120,7 +120,7 @@ pub(super) struct Item<'a> {
 
 impl<'a> Item<'a> {
     /// Where the value stands.
-    pub fn place(&self) -> Place {
+    pub fn place(&self) -> Box<Place> {
         self.source.place(self.span.clone())
     }
 

@@ -1,16 +1,19 @@
 //! glTF 2.0 and GLB through the gltf crate.
 //!
-//! All triangles of the default scene, node transforms baked in. The crate's accessor readers panic on data
+//! All triangles of the default scene, node transforms baked in, Draco streams unpacked. The crate's accessor readers panic on data
 //! that is not there, so every accessor is checked against its buffer before it is read.
 
 use std::path::Path;
 
 use ::gltf as crate_gltf;
 use crate_gltf::accessor::{Accessor, DataType, Dimensions};
+use crate_gltf::json::Index;
 use crate_gltf::mesh::Mode;
 use crate_gltf::{Document, Gltf, Primitive, Semantic};
 use glam::{Affine3A, Mat4, Vec2, Vec3};
+use serde::Deserialize as _;
 
+use super::draco::{self, Announced, Compressed};
 use super::{FileMaterial, FileTexture, LoadMeshErrorKind, LoadedFile, Parts, beside};
 use crate::surface::MeshBuilder;
 
@@ -50,7 +53,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
         let name = node.name().or(mesh.name()).unwrap_or("");
         for primitive in mesh.primitives() {
             let place = format!("mesh {} primitive {}", mesh.index(), primitive.index());
-            let builder = read_primitive(&primitive, &buffers, &place)?;
+            let builder = read_primitive(&primitive, &document, &buffers, &place)?;
             let builder = builder.transformed(&to_world);
             parts.add(name, primitive.material().index(), builder);
         }
@@ -76,18 +79,37 @@ fn bad_document(error: &crate_gltf::Error) -> LoadMeshErrorKind {
     malformed("glTF document", error.to_string())
 }
 
-/// Checked by the crate, after extensions that leave the shape alone are struck off the required ones.
+/// Checked by the crate, after extensions that we know, or that leave the shape alone, are struck off the
+/// required ones.
+///
+/// The crate does not know that an accessor may have no buffer view (those of a compressed primitive have
+/// none): such get one for the time of the check.
 fn validated(document: Document) -> Result<Document, LoadMeshErrorKind> {
     let mut root = document.into_json();
     root.extensions_required.retain(|name| {
-        !name.starts_with("KHR_materials_") && !HARMLESS_EXTENSIONS.contains(&name.as_str())
+        !name.starts_with("KHR_materials_")
+            && !HARMLESS_EXTENSIONS.contains(&name.as_str())
+            && name != draco::EXTENSION
     });
     if let Some(name) = root.extensions_required.first() {
         return Err(LoadMeshErrorKind::Unsupported {
             what: format!("the glTF extension {name}, which the file requires,"),
         });
     }
-    Document::from_json(root).map_err(|e| bad_document(&e))
+    let mut lent = vec![false; root.accessors.len()];
+    for (accessor, lent) in root.accessors.iter_mut().zip(&mut lent) {
+        *lent = accessor.buffer_view.is_none() && accessor.sparse.is_none();
+        if *lent {
+            accessor.buffer_view = Some(Index::new(0));
+        }
+    }
+    let mut root = Document::from_json(root)
+        .map_err(|e| bad_document(&e))?
+        .into_json();
+    for (accessor, _) in root.accessors.iter_mut().zip(lent).filter(|(_, l)| *l) {
+        accessor.buffer_view = None;
+    }
+    Ok(Document::from_json_without_validation(root))
 }
 
 /// The crate trusts the length in the header not to be less than the header itself.
@@ -193,6 +215,7 @@ fn percent_decoded(uri: &str) -> String {
 /// The triangles of a primitive in its own space; none for points and lines.
 fn read_primitive(
     primitive: &Primitive,
+    document: &Document,
     buffers: &[Vec<u8>],
     place: &str,
 ) -> Result<MeshBuilder, LoadMeshErrorKind> {
@@ -201,6 +224,11 @@ fn read_primitive(
         Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
     ) {
         return Ok(MeshBuilder::default());
+    }
+    if let Some(extension) = primitive.extension_value(draco::EXTENSION) {
+        let compressed = Compressed::deserialize(extension)
+            .map_err(|e| malformed(&format!("{place} {}", draco::EXTENSION), e.to_string()))?;
+        return read_compressed(primitive, &compressed, document, buffers, place);
     }
     let floats = [DataType::F32];
     let attributes = [
@@ -238,15 +266,97 @@ fn read_primitive(
     check_indices(&indices, positions.len(), place)?;
     Ok(MeshBuilder {
         normals: normals.map(Vec3::from).collect(),
-        // glTF's v points down.
         texcoords: texcoords
             .into_iter()
             .flatten()
-            .map(|[u, v]| Vec2::new(u, 1.0 - v))
+            .map(|st| v_up(st.into()))
             .collect(),
         triangles: triangles(primitive.mode(), &indices, place)?,
         positions,
     })
+}
+
+/// glTF's v points down.
+fn v_up(st: Vec2) -> Vec2 {
+    Vec2::new(st.x, 1.0 - st.y)
+}
+
+/// A primitive whose triangles are in a Draco stream. Whatever its mode, the stream holds single triangles.
+fn read_compressed(
+    primitive: &Primitive,
+    compressed: &Compressed,
+    document: &Document,
+    buffers: &[Vec<u8>],
+    place: &str,
+) -> Result<MeshBuilder, LoadMeshErrorKind> {
+    for semantic in [Semantic::Normals, Semantic::TexCoords(0)] {
+        let name = semantic.to_string();
+        if primitive.get(&semantic).is_some() && !compressed.attributes.contains_key(&name) {
+            return Err(LoadMeshErrorKind::Unsupported {
+                what: format!("{place}: {name} outside of the primitive's Draco stream"),
+            });
+        }
+    }
+    let what = format!("{place} Draco stream");
+    let stream = view_bytes(document, compressed.buffer_view, buffers)
+        .ok_or_else(|| malformed(&what, "its buffer view lies outside of the buffer"))?;
+    let count = |accessor: Option<Accessor>| accessor.map_or(0, |a| a.count());
+    let announced = Announced {
+        vertices: count(primitive.get(&Semantic::Positions)),
+        triangles: count(primitive.indices()) / 3,
+    };
+    let decoded = draco::decode(stream, &compressed.attributes, announced)
+        .map_err(|problem| malformed(&what, problem))?;
+    check_indices(
+        decoded.triangles.as_flattened(),
+        decoded.positions.len(),
+        place,
+    )?;
+    if let Some(accessor) = primitive.get(&Semantic::Positions) {
+        check_bounds(&decoded.positions, &accessor, &what)?;
+    }
+    Ok(MeshBuilder {
+        positions: decoded.positions,
+        normals: decoded.normals,
+        texcoords: decoded.texcoords.into_iter().map(v_up).collect(),
+        triangles: decoded.triangles,
+    })
+}
+
+/// A Draco stream has no checksum, and many a damaged one unpacks to a wild mesh: the box that the accessor
+/// must give tells.
+fn check_bounds(
+    positions: &[Vec3],
+    accessor: &Accessor,
+    what: &str,
+) -> Result<(), LoadMeshErrorKind> {
+    /// Of the longest side: more than any useful quantisation moves a vertex.
+    const SLACK: f32 = 0.05;
+    let corner = |value| serde_json::from_value(value).ok().map(Vec3::from_array);
+    let box_of_file = accessor
+        .min()
+        .and_then(corner)
+        .zip(accessor.max().and_then(corner));
+    let Some((min, max)) = box_of_file else {
+        return Ok(());
+    };
+    let slack = SLACK * (max - min).max_element();
+    let inside = |p: &&Vec3| p.cmpge(min - slack).all() && p.cmple(max + slack).all();
+    match positions.iter().find(|p| !inside(p)) {
+        Some(p) => Err(malformed(
+            what,
+            format!(
+                "it holds the position {p}, outside of {min} to {max} that the file gives; is it damaged?"
+            ),
+        )),
+        None => Ok(()),
+    }
+}
+
+fn view_bytes<'a>(document: &Document, view: usize, buffers: &'a [Vec<u8>]) -> Option<&'a [u8]> {
+    let view = document.views().nth(view)?;
+    let end = view.offset().checked_add(view.length())?;
+    buffers.get(view.buffer().index())?.get(view.offset()..end)
 }
 
 fn check_indices(indices: &[u32], vertices: usize, place: &str) -> Result<(), LoadMeshErrorKind> {
@@ -367,16 +477,13 @@ fn read_image(
             None => Some(FileTexture::Path(beside(path, &percent_decoded(uri)))),
         };
     }
-    let view = document.views().nth(image.buffer_view?.value())?;
-    let end = view.offset().checked_add(view.length())?;
-    let bytes = buffers
-        .get(view.buffer().index())?
-        .get(view.offset()..end)?;
+    let bytes = view_bytes(document, image.buffer_view?.value(), buffers)?;
     Some(FileTexture::Embedded(bytes.to_vec()))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::draco::tests::{SHEET, sheet};
     use super::super::tests::load_bytes;
     use super::super::{LoadMeshError, load_mesh};
     use super::*;
@@ -582,12 +689,81 @@ mod tests {
         let mut document = document();
         document["extensionsRequired"] = json!(["KHR_materials_unlit"]);
         assert!(load(&document).is_ok());
-        document["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+        document["extensionsRequired"] = json!(["EXT_meshopt_compression"]);
         let error = load(&document).unwrap_err();
         assert!(
-            error.to_string().contains("KHR_draco_mesh_compression"),
+            error.to_string().contains("EXT_meshopt_compression"),
             "{error}"
         );
+    }
+
+    /// The document over a Draco stream: its accessors have no buffer views.
+    fn compressed_document(stream: &[u8]) -> Value {
+        let mut document = document();
+        document["extensionsUsed"] = json!([draco::EXTENSION]);
+        document["extensionsRequired"] = json!([draco::EXTENSION]);
+        document["meshes"][0]["primitives"][0]["extensions"] = json!({draco::EXTENSION: {
+            "bufferView": 0, "attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2},
+        }});
+        let accessors = document["accessors"].as_array_mut().unwrap();
+        let counts = [SHEET.vertices, SHEET.vertices, 3 * SHEET.triangles];
+        accessors[0]["max"] = json!([3.0, 2.0, 1.0]);
+        for (accessor, count) in accessors.iter_mut().zip(counts) {
+            accessor.as_object_mut().unwrap().remove("bufferView");
+            accessor["count"] = json!(count);
+        }
+        document["bufferViews"] = json!([{"buffer": 0, "byteLength": stream.len()}]);
+        document["buffers"] = json!([{"byteLength": stream.len()}]);
+        document
+    }
+
+    #[test]
+    fn a_compressed_primitive_is_unpacked_with_v_up() {
+        let stream = sheet(7);
+        let document = compressed_document(&stream);
+        let mut file = load_bytes("m.glb", &glb(&document, &stream)).unwrap();
+        let mesh = file.parts.remove(0).mesh;
+        assert_eq!(mesh.triangles.len(), SHEET.triangles);
+        for (p, st) in mesh.positions.iter().zip(&mesh.texcoords) {
+            // The sheet is at y = 2 v with v down.
+            assert!((p.y - 2.0 * (1.0 - st.y)).abs() < 1e-3, "{p} at {st}");
+        }
+    }
+
+    #[test]
+    fn broken_compressed_primitives_are_refused() {
+        let stream = sheet(7);
+        let extension = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression";
+        for (pointer, value) in [
+            ("", json!(1)),
+            ("/bufferView", json!(1)),
+            ("/bufferView", json!(-1)),
+            ("/attributes", json!({"NORMAL": 1, "TEXCOORD_0": 2})),
+            ("/attributes/POSITION", json!(7)),
+            ("/attributes", json!({"POSITION": 0})),
+        ] {
+            let mut document = compressed_document(&stream);
+            let pointer = format!("{extension}{pointer}");
+            *document.pointer_mut(&pointer).unwrap() = value.clone();
+            let result = load_bytes("m.glb", &glb(&document, &stream));
+            assert!(result.is_err(), "{pointer} = {value}");
+        }
+        // Announced counts, and accessors that stand without the extension.
+        let mut few = compressed_document(&stream);
+        few["accessors"][2]["count"] = json!(3);
+        assert!(load_bytes("m.glb", &glb(&few, &stream)).is_err());
+        let mut beyond = compressed_document(&stream);
+        beyond["accessors"][0]["max"] = json!([2.0, 2.0, 1.0]);
+        let error = load_bytes("m.glb", &glb(&beyond, &stream)).unwrap_err();
+        assert!(error.to_string().contains("outside"), "{error}");
+        let mut bare = compressed_document(&stream);
+        bare["meshes"][0]["primitives"][0]["extensions"] = json!({});
+        assert!(load_bytes("m.glb", &glb(&bare, &stream)).is_err());
+        for length in (0..stream.len()).step_by(11) {
+            let document = compressed_document(&stream[..length]);
+            let error = load_bytes("m.glb", &glb(&document, &stream[..length])).unwrap_err();
+            assert!(error.to_string().contains("Draco"), "{error}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! one part whose triangle k is the file's face k. Polygons are cut into fans from their first corner.
 //! Texture coordinates come out with v up, whatever the format's habit.
 
+mod draco;
 mod gltf;
 mod mtl;
 mod obj;
@@ -16,7 +17,8 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use thiserror::Error;
 
-use crate::surface::{MeshBuilder, UvTransform, Wrap};
+use crate::ray::Aabb;
+use crate::surface::{MeshBuilder, Projection, UvTransform, Wrap};
 
 /// Endings of the files that [`load_mesh`] reads.
 pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
@@ -177,6 +179,20 @@ pub fn load_mesh(path: &Path) -> Result<LoadedFile, LoadMeshError> {
 }
 
 impl LoadedFile {
+    /// Replaces all texture coordinates by those of a projection around the whole file.
+    pub fn project(&mut self, projection: Projection) {
+        let corners = |mesh: &MeshBuilder| {
+            let indices = mesh.triangles.as_flattened().iter();
+            let positions = indices.filter_map(|&i| mesh.positions.get(i as usize));
+            positions.fold(Aabb::EMPTY, |b, &p| b.including(p))
+        };
+        let parts = self.parts.iter().map(|part| corners(&part.mesh));
+        let bounds = parts.fold(Aabb::EMPTY, Aabb::union);
+        for part in &mut self.parts {
+            part.mesh.project(projection, bounds);
+        }
+    }
+
     /// All parts as one mesh, part after part; the materials are dropped.
     pub fn into_single_mesh(self) -> MeshBuilder {
         let mut whole = MeshBuilder::default();
@@ -323,6 +339,19 @@ mod tests {
     fn the_ending_may_be_in_capitals() {
         let file = load_bytes("MESH.OBJ", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
         assert_eq!(file.parts[0].name, "MESH");
+    }
+
+    #[test]
+    fn a_projection_goes_across_the_parts_of_a_file() {
+        let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 4 0 0\nv 4 2 0\nvt 9 9\nf 1/1 2/1 3/1\nf 2 4 5\n";
+        let mut file = load_bytes("two.obj", text).unwrap();
+        assert_eq!(file.parts.len(), 2);
+        file.project(Projection::Planar);
+        let whole = file.into_single_mesh();
+        assert_eq!(whole.texcoords.len(), whole.positions.len());
+        for (p, st) in whole.positions.iter().zip(&whole.texcoords) {
+            assert_eq!(*st, p.truncate() / 4.0);
+        }
     }
 
     #[test]
