@@ -148,8 +148,8 @@ fn scene(scale: f32, midlevel: f32) -> String {
     format!(
         r#"# An asteroid of 480 triangles above a polished floor.
 [camera]
-position = [0.6, 1.75, 4.9]
-target = [0.0, 1.28, 0.0]
+position = [0.6, 1.55, 4.9]
+target = [0.0, 1.16, 0.0]
 fov = 37.0
 
 [film]
@@ -187,8 +187,8 @@ roughness = 0.15
 
 [[light]]
 type = "sun"
-elevation = 28.0
-azimuth = 62.0
+elevation = 33.0
+azimuth = 50.0
 
 [[light]]
 type = "sky"

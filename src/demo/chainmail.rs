@@ -46,10 +46,10 @@ fn make(map_size: usize) -> DemoFiles {
     let mesh = base_mesh(map_size);
     let unit_length = sheet_size().x / RINGS;
     let heights = paint::heights(map_size, |st| {
-        unit_length * mail(st * sheet_size() / unit_length).height
+        unit_length * height(st * sheet_size() / unit_length)
     });
     let color_size = map_size / 2;
-    let colors = paint::colors(color_size, |st| mail(st * sheet_size() / unit_length).color);
+    let colors = paint::colors(color_size, |st| color(st * sheet_size() / unit_length));
     let scene = scene(heights.scale(), heights.midlevel());
     DemoFiles {
         mesh,
@@ -124,17 +124,26 @@ fn fallen_sheet() -> Sheet {
     drape::drape(sheet, ball, 900)
 }
 
-/// What is seen at a point of the sheet.
-struct Mail {
-    /// In distances between rings.
-    height: f32,
-    /// Linear.
-    color: Vec3,
+/// The topmost thing at a point of the sheet.
+enum Top {
+    Padding,
+    Wire(Wire),
 }
 
-/// `p` in distances between rings, from the sheet's corner.
-fn mail(p: Vec2) -> Mail {
-    let mut best = padding(p);
+/// The top of a ring's wire. Lengths in distances between rings.
+struct Wire {
+    height: f32,
+    /// Random bits of the ring.
+    id: u32,
+    /// Along and across the wire.
+    place: Vec2,
+    brass: bool,
+}
+
+/// `p` in distances between rings, from the sheet's corner. The padding is below all wires.
+fn top(p: Vec2) -> Top {
+    let mut best = Top::Padding;
+    let mut highest = f32::NEG_INFINITY;
     let row = (p.y / ring::ROW).round() as i32;
     for j in row - 1..=row + 1 {
         let shift = if j & 1 == 0 { 0.0 } else { 0.5 };
@@ -143,13 +152,32 @@ fn mail(p: Vec2) -> Mail {
             let centre = Vec2::new(i as f32 + shift, j as f32 * ring::ROW);
             if is_whole(centre)
                 && let Some(found) = wire(p, centre, j, hash(3, i, j, 0))
-                && found.height > best.height
+                && found.height > highest
             {
-                best = found;
+                highest = found.height;
+                best = Top::Wire(found);
             }
         }
     }
     best
+}
+
+fn height(p: Vec2) -> f32 {
+    match top(p) {
+        Top::Padding => -0.30 + 0.012 * threads(p) + 0.02 * wear(p),
+        Top::Wire(wire) => wire.height,
+    }
+}
+
+/// Linear.
+fn color(p: Vec2) -> Vec3 {
+    match top(p) {
+        Top::Padding => {
+            let brown = Vec3::new(0.060, 0.036, 0.020);
+            brown * (0.55 + 0.45 * threads(p)) * (1.0 + 0.5 * wear(p))
+        }
+        Top::Wire(wire) => metal(p, &wire),
+    }
 }
 
 /// Rings that would stick out of the sheet are left away.
@@ -159,21 +187,21 @@ fn is_whole(centre: Vec2) -> bool {
     centre.cmpge(Vec2::splat(reach)).all() && centre.cmple(size - reach).all()
 }
 
-/// The quilted linen behind the rings.
-fn padding(p: Vec2) -> Mail {
-    let threads = 14.0;
-    let (a, b) = (p * threads * std::f32::consts::PI).sin().into();
-    let over = if a * b > 0.0 { a.abs() } else { b.abs() };
-    let wear = fbm2(8, 0.8 * p, Octaves::new(3));
-    let brown = Vec3::new(0.060, 0.036, 0.020);
-    Mail {
-        height: -0.30 + 0.012 * over + 0.02 * wear,
-        color: brown * (0.55 + 0.45 * over) * (1.0 + 0.5 * wear),
-    }
+/// The woven linen behind the rings: 0 between threads, 1 on top of one.
+fn threads(p: Vec2) -> f32 {
+    let (a, b) = (14.0 * std::f32::consts::PI * p)
+        .to_array()
+        .map(f32::sin)
+        .into();
+    if a * b > 0.0 { a.abs() } else { b.abs() }
+}
+
+fn wear(p: Vec2) -> f32 {
+    fbm2(8, 0.8 * p, Octaves::new(3))
 }
 
 /// The top of one ring's wire above `p`, if it is there.
-fn wire(p: Vec2, centre: Vec2, row: i32, id: u32) -> Option<Mail> {
+fn wire(p: Vec2, centre: Vec2, row: i32, id: u32) -> Option<Wire> {
     let random = |k: i32| unit(hash(id, k, 0, 0)) - 0.5;
     // No ring hangs quite like the next, and none is quite round.
     let centre = centre + 0.035 * Vec2::new(random(1), random(2));
@@ -186,6 +214,10 @@ fn wire(p: Vec2, centre: Vec2, row: i32, id: u32) -> Option<Mail> {
     let d = p - centre;
     let cosine = 1.0 / (1.0 + lean * lean).sqrt();
     let e = Vec2::new(d.x / cosine, d.y);
+    // Half the widest wire and the largest departure from a circle.
+    if (e.length() - ring::RADIUS).abs() > (1.28 * ring::WIRE + 0.03 * ring::RADIUS) / cosine {
+        return None;
+    }
     let angle = e.to_angle();
     let radius = ring::RADIUS * (1.0 + 0.03 * (2.0 * angle + 6.0 * random(5)).cos());
     // The ring closes at a flattened, riveted lap.
@@ -210,10 +242,11 @@ fn wire(p: Vec2, centre: Vec2, row: i32, id: u32) -> Option<Mail> {
     let rivet = 0.045 * (1.0 - rivet_at * rivet_at).max(0.0).sqrt();
     let dents = 0.006 * gradient2(id, 9.0 * along) + 0.0022 * gradient2(next(id), 40.0 * along);
     let height = lean * d.x + tilt * d.y + section + rivet + dents;
-    let depth = smoothstep(-0.25, 0.15, height);
-    Some(Mail {
+    Some(Wire {
         height,
-        color: metal(p, id, along, depth, is_brass(centre)),
+        id,
+        place: along,
+        brass: is_brass(centre),
     })
 }
 
@@ -224,11 +257,15 @@ fn is_brass(centre: Vec2) -> bool {
     edge < 2.6
 }
 
-fn metal(p: Vec2, id: u32, along: Vec2, depth: f32, brass: bool) -> Vec3 {
+fn metal(p: Vec2, wire: &Wire) -> Vec3 {
+    let Wire {
+        height, id, brass, ..
+    } = *wire;
+    let depth = smoothstep(-0.25, 0.15, height);
     let steel = Vec3::new(0.56, 0.57, 0.58);
     let gold = Vec3::new(0.80, 0.56, 0.24);
     let base = if brass { gold } else { steel };
-    let scratches = gradient2(id, along * Vec2::new(6.0, 45.0));
+    let scratches = gradient2(id, wire.place * Vec2::new(6.0, 45.0));
     let rust = smoothstep(0.15, 0.6, fbm2(17, 0.22 * p, Octaves::new(6)))
         * smoothstep(0.2, -0.3, gradient2(18, 5.0 * p));
     let shade = mix(0.45, 1.0, depth) * (1.0 + 0.15 * (unit(id) - 0.5) + 0.10 * scratches);
@@ -240,8 +277,8 @@ fn scene(scale: f32, midlevel: f32) -> String {
     format!(
         r#"# Chain mail of 1423 triangles, draped over a ball.
 [camera]
-position = [0.9, 1.9, 3.9]
-target = [0.0, 0.38, 0.05]
+position = [0.8, 1.75, 3.3]
+target = [0.0, 0.34, 0.08]
 fov = 37.0
 
 [film]

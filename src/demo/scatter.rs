@@ -33,6 +33,7 @@ impl Scatter {
             reach,
             discs: Vec::new(),
         };
+        let side = 2.0 / bins_per_side as f32;
         for (index, disc) in discs.iter().enumerate() {
             let extent = Vec3::splat(reach * disc.radius);
             let lo = scatter.bin_of(disc.centre - extent);
@@ -40,8 +41,13 @@ impl Scatter {
             for z in lo[2]..=hi[2] {
                 for y in lo[1]..=hi[1] {
                     for x in lo[0]..=hi[0] {
-                        let bin = scatter.bin_index([x, y, z]);
-                        scatter.bins[bin].push(index as u32);
+                        let low = Vec3::new(x as f32, y as f32, z as f32) * side - 1.0;
+                        let nearest = disc.centre.clamp(low, low + side);
+                        // A hundredth more than the reach, for rounding.
+                        if nearest.distance(disc.centre) < 1.01 * extent.x {
+                            let bin = scatter.bin_index([x, y, z]);
+                            scatter.bins[bin].push(index as u32);
+                        }
                     }
                 }
             }
@@ -54,11 +60,12 @@ impl Scatter {
     pub fn around(&self, p: Vec3) -> impl Iterator<Item = (&Disc, f32)> {
         self.bins[self.bin_index(self.bin_of(p))]
             .iter()
-            .map(move |&index| {
+            .filter_map(move |&index| {
                 let disc = &self.discs[index as usize];
-                (disc, disc.centre.distance(p) / disc.radius)
+                let square = disc.centre.distance_squared(p);
+                let limit = self.reach * disc.radius;
+                (square < limit * limit).then(|| (disc, square.sqrt() / disc.radius))
             })
-            .filter(|&(_, q)| q < self.reach)
     }
 
     fn bin_of(&self, p: Vec3) -> [usize; 3] {

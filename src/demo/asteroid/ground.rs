@@ -2,12 +2,11 @@
 
 use glam::Vec3;
 
-use crate::demo::noise::{
-    Octaves, cellular3, fbm3, gradient3, mix, next, ridged3, smoothstep, unit,
-};
+use crate::demo::noise::{Octaves, fbm3, gradient3, mix, next, ridged3, smoothstep, unit};
 use crate::demo::scatter::{Disc, Scatter, power_law};
 
-/// Where a crater's blanket of ejecta ends, in crater radii.
+/// Where a crater's blanket of ejecta ends, in crater radii, and the same with room for bent circles.
+const EJECTA_END: f32 = 1.75;
 const EJECTA_REACH: f32 = 2.0;
 
 /// The body: craters, boulders and what lies between.
@@ -23,7 +22,7 @@ struct Features {
     /// The part of it from coarser classes of sizes.
     larger: f32,
     /// The present class of sizes, see `size_class`.
-    class: i32,
+    class: usize,
     /// 0 bare rock, 1 deep dust.
     dust: f32,
     /// Brightness of fresh ejecta, 0..1.
@@ -53,29 +52,24 @@ impl Ground {
     /// The distance of the surface from the centre in unit direction `d`.
     pub fn radius(&self, d: Vec3) -> f32 {
         let f = self.features(d);
-        let hills = 0.020 * fbm3(11, 3.1 * d, Octaves::new(3));
-        let crags = 0.016 * (ridged3(12, 5.0 * d, Octaves::new(5)) - 0.5);
-        let grain = 0.006
-            * fbm3(
-                13,
-                34.0 * d,
-                Octaves {
-                    count: 6,
-                    gain: 0.6,
-                },
-            );
+        let hills = 0.020 * fbm3(11, 3.1 * d, Octaves::new(2));
+        let crags = 0.016 * (ridged3(12, 5.0 * d, Octaves::new(4)) - 0.5);
+        let gravel = Octaves {
+            count: 5,
+            gain: 0.6,
+        };
+        let grain = 0.006 * fbm3(13, 40.0 * d, gravel);
         let rough = mix(1.0, 0.3, f.dust);
-        let pits = -0.0035 * smoothstep(0.42, 0.1, cellular3(14, 42.0 * d).f1);
-        self.smooth_radius(d) + hills + rough * (crags + grain) + pits + f.craters + f.boulder.0
+        self.smooth_radius(d) + hills + rough * (crags + grain) + f.craters + f.boulder.0
     }
 
     /// Linear albedo in unit direction `d`.
     pub fn color(&self, d: Vec3) -> Vec3 {
         let f = self.features(d);
-        let mottle = fbm3(21, 4.0 * d, Octaves::new(6));
-        let speckle = fbm3(22, 90.0 * d, Octaves::new(3));
-        let warm = Vec3::new(0.33, 0.265, 0.205);
-        let cool = Vec3::new(0.235, 0.225, 0.22);
+        let mottle = fbm3(21, 4.0 * d, Octaves::new(5));
+        let speckle = fbm3(22, 90.0 * d, Octaves::new(2));
+        let warm = Vec3::new(0.30, 0.25, 0.205);
+        let cool = Vec3::new(0.21, 0.21, 0.215);
         let mut c = warm.lerp(cool, smoothstep(-0.35, 0.35, mottle));
         c *= 1.0 + 0.35 * speckle + 0.25 * mottle;
         c = c.lerp(Vec3::new(0.20, 0.17, 0.145), 0.55 * f.hollow);
@@ -100,7 +94,7 @@ impl Ground {
             boulder: (0.0, 0),
         };
         // No circle is perfect.
-        let bend = 0.22 * fbm3(32, 6.0 * d, Octaves::new(3));
+        let bend = 0.2 * fbm3(32, 6.0 * d, Octaves::new(2));
         for (disc, q) in self.craters.around(d) {
             add_crater(&mut f, disc, q * (1.0 + bend), d);
         }
@@ -116,58 +110,55 @@ impl Ground {
 
 /// Lays one crater over the older and larger ones: what was there before is worn away inside it.
 fn add_crater(f: &mut Features, disc: &Disc, q: f32, d: Vec3) {
-    let age = unit(next(disc.id));
-    // Small craters are deep for their size; old ones have been filled and their rims worn down.
-    let depth =
-        disc.radius * mix(0.50, 0.36, smoothstep(0.02, 0.5, disc.radius)) * mix(1.0, 0.55, age);
-    let rim = 0.24 * depth * mix(1.2, 0.5, age);
-    let inside = smoothstep(1.0, 0.75, q);
-    let fade = smoothstep(EJECTA_REACH * 0.87, 1.1, q);
-    let profile = if q < 1.0 {
-        let bowl = q * q;
-        // A flat floor of fallen rock in large ones.
-        let floor = mix(-1.2, -0.86, smoothstep(0.08, 0.3, disc.radius));
-        let wall = mix(-1.0, rim / depth, bowl * mix(0.75, 1.0, q));
-        depth * (wall.max(floor) + 0.02 * (wall - floor).min(0.0))
-    } else {
-        rim * q.powf(-2.6) * fade
-    };
-    let streaks = rays(disc, d, q);
+    let fade = smoothstep(EJECTA_END, 1.1, q);
+    if fade == 0.0 {
+        return;
+    }
     // A small crater wears away its like, not the slope of the great one that it lies in.
-    if size_class(disc.radius) > f.class {
-        f.class = size_class(disc.radius);
+    let class = size_class(disc.radius);
+    if class > f.class {
+        f.class = class;
         f.larger = f.craters;
     }
-    f.craters = mix(f.craters, mix(f.larger, f.craters, 0.25), inside) + profile;
-    f.craters += 0.35 * rim * streaks * smoothstep(1.0, 1.25, q) * fade;
-    f.dust = mix(
-        f.dust,
-        mix(0.95, 0.35, age),
-        inside * smoothstep(0.9, 0.4, q),
-    );
-    f.dust = mix(
-        f.dust,
-        0.15,
-        smoothstep(0.25, 0.0, (q - 0.95).abs()) * (1.0 - age),
-    );
+    let age = unit(next(disc.id));
+    // Small craters are deep for their size; old ones have been filled and their rims worn down.
+    let size = smoothstep(0.02, 0.5, disc.radius);
+    let depth = disc.radius * mix(0.52, 0.40, size) * mix(1.0, 0.55, age);
+    let rim = 0.26 * depth * mix(1.2, 0.5, age);
+    if q < 1.0 {
+        add_bowl(f, disc, q, age, [depth, rim]);
+    } else {
+        let streaks = rays(disc, d, q);
+        let blanket = 1.0 / (q * q * q.sqrt());
+        f.craters += rim * fade * (blanket + 0.35 * streaks * smoothstep(1.0, 1.25, q));
+        let young = smoothstep(0.35, 0.1, age);
+        f.fresh = f.fresh.max(young * fade * mix(0.35, 1.0, streaks));
+    }
+    let on_rim = smoothstep(0.25, 0.0, (q - 0.95).abs());
+    f.dust = mix(f.dust, 0.15, on_rim * (1.0 - age));
+}
+
+/// Within the rim.
+fn add_bowl(f: &mut Features, disc: &Disc, q: f32, age: f32, [depth, rim]: [f32; 2]) {
+    let inside = smoothstep(1.0, 0.75, q);
+    // A flat floor of fallen rock in large ones.
+    let floor = mix(-1.2, -0.86, smoothstep(0.08, 0.3, disc.radius));
+    let wall = mix(-1.0, rim / depth, q * q * mix(0.75, 1.0, q));
+    f.craters = mix(f.craters, mix(f.larger, f.craters, 0.25), inside);
+    f.craters += depth * (wall.max(floor) + 0.02 * (wall - floor).min(0.0));
+    let bottom = inside * smoothstep(0.9, 0.4, q);
+    f.dust = mix(f.dust, mix(0.95, 0.35, age), bottom);
     f.hollow = f.hollow.max(smoothstep(0.8, 0.2, q) * mix(1.0, 0.5, age));
-    let young = smoothstep(0.35, 0.1, age);
-    f.fresh = f
-        .fresh
-        .max(young * fade * smoothstep(0.7, 1.0, q) * mix(0.35, 1.0, streaks));
 }
 
 /// 0 for the largest craters, 1 more whenever the radius falls by a factor of 2.5. Absolute, so that a crater that only
 /// just reaches a point changes nothing there.
-fn size_class(radius: f32) -> i32 {
-    (-radius.ln() / 2.5f32.ln()) as i32
+fn size_class(radius: f32) -> usize {
+    [0.4, 0.16, 0.064, 0.0256].partition_point(|&least| least > radius)
 }
 
 /// Radial streaks of thrown-out matter around a crater, 0..1.
 fn rays(disc: &Disc, d: Vec3, q: f32) -> f32 {
-    if q < 0.6 {
-        return 0.0;
-    }
     let out = (d - disc.centre).normalize_or_zero();
     let spokes = gradient3(disc.id, 4.5 * out + 0.3 * q * Vec3::ONE);
     smoothstep(0.0, 0.5, spokes)

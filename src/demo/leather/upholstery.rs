@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::demo::noise::{Octaves, cellular2, fbm2, gradient2, mix, smooth_max, smoothstep};
+use crate::demo::noise::{Octaves, cellular2, fbm2, gradient2, mix, smoothstep};
 
 /// Where on the bench.
 pub struct Place {
@@ -26,7 +26,7 @@ pub struct Look {
 const PUFF: f32 = 0.105;
 /// Between buttons of a row; the next row stands half a pitch aside and half a pitch away.
 const PITCH: f32 = 0.44;
-const BUTTON: f32 = 0.040;
+const BUTTON: f32 = 0.043;
 /// `Place::down` of the piping between top and sides, of the stitches on both sides of it, and of the nails.
 const PIPING: f32 = 0.205;
 const PIPING_RADIUS: f32 = 0.019;
@@ -143,7 +143,8 @@ impl Upholstery {
         let mut lip = 0.0f32;
         for pleat in self.pleats_near(p) {
             let (depth, fold) = pleat.depth_and_lip(q);
-            crease = smooth_max(crease, depth, 0.06);
+            // Where two meet both count, and neither does beyond its reach.
+            crease += depth - crease * depth;
             lip = lip.max(fold);
         }
         let (r, out) = self.nearest_button(p);
@@ -160,8 +161,8 @@ impl Upholstery {
         look.height += puff;
         if r < BUTTON {
             let dome = (1.0 - (r / BUTTON).powi(2)).sqrt();
-            look.height = look.height.max(0.006 + 0.030 * dome + 0.3 * grain(p));
-            look.color *= mix(0.8, 1.35, dome);
+            look.height = look.height.max(0.012 + 0.032 * dome + 0.3 * grain(p));
+            look.color *= mix(1.0, 2.2, dome);
         }
         add_seam(&mut look, PIPING - place.down, place.around);
         look
@@ -218,7 +219,9 @@ fn crease_reach() -> f32 {
 /// The section of a cushion: 0 at its seam with a steep rise, 1 level at `x` = 1.
 fn bulge(x: f32) -> f32 {
     let from_middle = 1.0 - x.clamp(0.0, 1.0);
-    (1.0 - from_middle.powf(2.2)).powf(0.62)
+    let round = (1.0 - from_middle * from_middle).sqrt();
+    // The power 1.25 leans the section in a little from a circle's.
+    round * round.sqrt().sqrt()
 }
 
 /// The panels around the bench, below the piping.
@@ -297,12 +300,12 @@ fn leather(p: Vec2, worn: f32, shaded: f32) -> Look {
     }
 }
 
-const GRAIN: f32 = 0.0016;
+const GRAIN: f32 = 0.0013;
 
 /// Pebbles of two sizes with creases between them, 0..`GRAIN`.
 fn grain(p: Vec2) -> f32 {
     let warp = 0.35 * Vec2::new(gradient2(9, 40.0 * p), gradient2(10, 40.0 * p));
-    let coarse = cellular2(11, 74.0 * p + warp);
+    let coarse = cellular2(11, 105.0 * p + warp);
     let fine = gradient2(12, 420.0 * p);
     let pebble = smoothstep(0.0, 0.42, coarse.f2 - coarse.f1);
     GRAIN * (0.82 * pebble + 0.09 * (1.0 + fine)).min(1.0)
