@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec2, Vec2, Vec3};
+use glam::{Affine2, DVec2, Vec2, Vec3};
 use thiserror::Error;
 
 use super::{BaseMesh, DisplacementMap, Patch, UvTransform};
@@ -58,6 +58,8 @@ pub struct DisplacedSurface {
     mesh: Arc<BaseMesh>,
     map: Arc<DisplacementMap>,
     displacement: Displacement,
+    /// The UV transform, its sine and cosine taken once.
+    uv: Affine2,
 }
 
 /// All a shader wants to know of a hit.
@@ -127,6 +129,7 @@ impl DisplacedSurface {
             mesh,
             map,
             displacement,
+            uv: uv.to_affine(),
         })
     }
 
@@ -157,7 +160,7 @@ impl DisplacedSurface {
         let texcoords = self
             .mesh
             .corner_texcoords(triangle)
-            .map(|st| self.displacement.uv.apply(st).as_dvec2());
+            .map(|st| self.uv.transform_point2(st).as_dvec2());
         let wrap = self.map.wrap();
         let periods = DVec2::new(
             wrap.whole_periods(texcoords[0].x),

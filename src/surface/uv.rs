@@ -1,6 +1,6 @@
 //! From a mesh's texture coordinates to a place in the map: the UV transform, and the wrap mode.
 
-use glam::{Mat2, Vec2};
+use glam::{Affine2, Vec2};
 
 /// What happens outside [0, 1] in texture space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
@@ -83,8 +83,13 @@ impl Default for UvTransform {
 }
 
 impl UvTransform {
+    /// As a matrix, for many coordinates.
+    pub fn to_affine(&self) -> Affine2 {
+        Affine2::from_scale_angle_translation(self.scale, self.rotation, self.offset)
+    }
+
     /// The transformed texture coordinates.
     pub fn apply(&self, st: Vec2) -> Vec2 {
-        Mat2::from_angle(self.rotation) * (self.scale * st) + self.offset
+        self.to_affine().transform_point2(st)
     }
 }
