@@ -184,11 +184,6 @@ fn spaced<L: Lanes>(from: f32, to: f32) -> L {
 /// The longest of the seven legs between eight points.
 #[inline(always)]
 fn longest_leg<L: Lanes>(x: L, y: L) -> f32 {
-    let (x, y) = (x.to_array(), y.to_array());
-    let mut longest = 0.0;
-    for l in 1..LANES {
-        let (dx, dy) = (x[l] - x[l - 1], y[l] - y[l - 1]);
-        longest = f32::max(longest, dx * dx + dy * dy);
-    }
-    longest.sqrt()
+    let (dx, dy) = (x.next() - x, y.next() - y);
+    dx.mul_add(dx, dy * dy).max_lane().sqrt()
 }

@@ -86,6 +86,28 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn next(self) -> Self {
+        // SAFETY: AVX2 is there wherever an `Avx2` is.
+        unsafe {
+            let order = _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 7);
+            Self(_mm256_permutevar8x32_ps(self.0, order))
+        }
+    }
+
+    #[inline(always)]
+    fn max_lane(self) -> f32 {
+        // SAFETY: AVX is there wherever an `Avx2` is.
+        unsafe {
+            let four = _mm_max_ps(
+                _mm256_castps256_ps128(self.0),
+                _mm256_extractf128_ps::<1>(self.0),
+            );
+            let two = _mm_max_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_max_ss(two, _mm_shuffle_ps::<1>(two, two)))
+        }
+    }
+
+    #[inline(always)]
     fn sign_mask(self) -> u32 {
         // SAFETY: AVX is there wherever an `Avx2` is.
         unsafe { _mm256_movemask_ps(self.0) as u32 }

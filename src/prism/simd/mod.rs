@@ -75,6 +75,10 @@ pub(crate) trait Lanes:
     fn max(self, other: Self) -> Self;
     fn floor(self) -> Self;
     fn sqrt(self) -> Self;
+    /// Lane k becomes lane k + 1; the last stays.
+    fn next(self) -> Self;
+    /// The largest lane.
+    fn max_lane(self) -> f32;
     /// Bit k: lane k's sign bit.
     fn sign_mask(self) -> u32;
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), integers in float lanes.
@@ -206,8 +210,20 @@ mod tests {
         }
     }
 
+    fn moves_lanes<L: Lanes>() {
+        let x = L::from_array([1.0, -2.0, 3.0, 9.0, -5.0, 6.0, 7.0, 8.0]);
+        assert_eq!(
+            x.next().to_array(),
+            [-2.0, 3.0, 9.0, -5.0, 6.0, 7.0, 8.0, 8.0]
+        );
+        assert_eq!(x.max_lane(), 9.0);
+        assert_eq!(x.next().next().next().next().max_lane(), 8.0);
+        assert_eq!(x.sign_mask(), 0b0001_0010);
+    }
+
     #[test]
     fn baseline_samples_the_map() {
+        moves_lanes::<Portable>();
         samples_like_the_map::<Portable>();
         survives_any_coordinate::<Portable>();
     }
@@ -216,6 +232,7 @@ mod tests {
     #[test]
     fn avx2_samples_the_map() {
         if SimdLevel::Avx2.is_supported() {
+            moves_lanes::<Avx2>();
             samples_like_the_map::<Avx2>();
             survives_any_coordinate::<Avx2>();
         }

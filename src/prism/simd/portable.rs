@@ -72,6 +72,17 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn next(self) -> Self {
+        let (a, b) = (self.0, self.1);
+        Self(Vec4::new(a.y, a.z, a.w, b.x), Vec4::new(b.y, b.z, b.w, b.w))
+    }
+
+    #[inline(always)]
+    fn max_lane(self) -> f32 {
+        self.0.max(self.1).max_element()
+    }
+
+    #[inline(always)]
     fn sign_mask(self) -> u32 {
         self.0.is_negative_bitmask() | self.1.is_negative_bitmask() << 4
     }
