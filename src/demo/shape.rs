@@ -195,6 +195,40 @@ mod tests {
     use super::*;
 
     #[test]
+    fn frames_stand_across_the_path_and_turn_little() {
+        let path: Vec<Vec3> = (0..40)
+            .map(|i| {
+                let t = 0.1 * i as f32;
+                Vec3::new(t.cos(), t, 1.5 * t.sin())
+            })
+            .collect();
+        let frames = frames_along(&path);
+        for i in 1..39 {
+            let (right, up) = frames[i];
+            let forward = (path[i + 1] - path[i - 1]).normalize();
+            assert!(right.cross(up).distance(forward) < 1e-5);
+            assert!(right.dot(frames[i - 1].0) > 0.95);
+        }
+    }
+
+    #[test]
+    fn normals_are_shared_over_a_seam_and_face_outward() {
+        let mut mesh = MeshBuilder::default();
+        let chart = add_grid(&mut mesh, (12, 8), Rect::texel_centres(64), |uv| {
+            let side = (12.0 * uv.x).round() % 12.0;
+            let around = Vec2::from_angle(std::f32::consts::TAU * side / 12.0);
+            Vec3::new(around.x, uv.y, -around.y)
+        });
+        smooth_normals(&mut mesh);
+        for j in 0..=8 {
+            let (a, b) = (chart.vertex(0, j), chart.vertex(12, j));
+            assert_eq!(mesh.positions[a], mesh.positions[b]);
+            assert_eq!(mesh.normals[a], mesh.normals[b]);
+            assert!(mesh.normals[a].distance(Vec3::X) < 0.05);
+        }
+    }
+
+    #[test]
     fn base_points_lie_on_the_triangles() {
         let mut mesh = MeshBuilder::default();
         let rect = Rect::atlas_cell(5, 4, 256, 3);
