@@ -26,6 +26,8 @@ const KITES: usize = 60;
 /// Cells of the atlas along a side; 60 of the 64 cells are used.
 const CELLS: usize = 8;
 const GUTTER: usize = 4;
+/// The base mesh's share of the smooth body's radius.
+const SHRINK: f32 = 0.94;
 
 fn make(map_size: usize) -> DemoFiles {
     let ground = Ground::new();
@@ -36,13 +38,13 @@ fn make(map_size: usize) -> DemoFiles {
     };
     let heights = paint::heights(map_size, |st| {
         let point = base(st);
-        let direction = settle(&ground, point.position, point.normal);
+        let direction = settle(point.position, point.normal);
         rise(point.position, point.normal, ground.radius(direction))
     });
     let color_size = map_size / 2;
     let colors = paint::colors(color_size, |st| {
         let point = base(st);
-        ground.color(settle(&ground, point.position, point.normal))
+        ground.color(settle(point.position, point.normal))
     });
     let scene = scene(heights.scale(), heights.midlevel());
     DemoFiles {
@@ -55,11 +57,11 @@ fn make(map_size: usize) -> DemoFiles {
     }
 }
 
-/// The direction in which the displaced point will lie: the smooth body's surface above `p` along `n`.
-/// One round is enough, because `n` is nearly radial.
-fn settle(ground: &Ground, p: Vec3, n: Vec3) -> Vec3 {
-    let d = rise(p, n, ground.smooth_radius(p.normalize()));
-    (p + d * n).normalize()
+/// The direction in which the displaced point will lie, but for craters and crags: the base mesh is
+/// the smooth body shrunk, and the normal is nearly radial.
+fn settle(p: Vec3, n: Vec3) -> Vec3 {
+    let rise = (1.0 / SHRINK - 1.0) * p.length();
+    (p + rise * n).normalize()
 }
 
 /// How far along `n` from `p` the sphere of the given radius about the origin is.
@@ -89,7 +91,7 @@ fn base_mesh(ground: &Ground, map_size: usize) -> (MeshBuilder, Vec<Chart>) {
             let rect = Rect::atlas_cell(index, CELLS, map_size, GUTTER);
             shape::add_grid(&mut mesh, (2, 2), rect, |uv| {
                 let direction = between(kite, uv).normalize();
-                0.94 * ground.smooth_radius(direction) * direction
+                SHRINK * ground.smooth_radius(direction) * direction
             })
         })
         .collect();

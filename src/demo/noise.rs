@@ -7,10 +7,26 @@ use glam::{Vec2, Vec3};
 
 /// A well mixed hash of a seed and a lattice point.
 pub fn hash(seed: u32, x: i32, y: i32, z: i32) -> u32 {
-    let mut h = seed.wrapping_mul(0x9e37_79b1)
-        ^ (x as u32).wrapping_mul(0x85eb_ca77)
-        ^ (y as u32).wrapping_mul(0xc2b2_ae3d).rotate_left(11)
-        ^ (z as u32).wrapping_mul(0x27d4_eb2f).rotate_left(22);
+    stir(spread_seed(seed) ^ spread_x(x) ^ spread_y(y) ^ spread_z(z))
+}
+
+fn spread_seed(seed: u32) -> u32 {
+    seed.wrapping_mul(0x9e37_79b1)
+}
+
+fn spread_x(x: i32) -> u32 {
+    (x as u32).wrapping_mul(0x85eb_ca77)
+}
+
+fn spread_y(y: i32) -> u32 {
+    (y as u32).wrapping_mul(0xc2b2_ae3d).rotate_left(11)
+}
+
+fn spread_z(z: i32) -> u32 {
+    (z as u32).wrapping_mul(0x27d4_eb2f).rotate_left(22)
+}
+
+fn stir(mut h: u32) -> u32 {
     h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
     h = (h ^ (h >> 12)).wrapping_mul(0x297a_2d39);
     h ^ (h >> 15)
@@ -47,17 +63,25 @@ fn fade(t: f32) -> f32 {
     t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
 }
 
-/// The 12 edge directions of a cube, 4 of them twice, dotted with `d`.
-fn dot_gradient3(h: u32, d: Vec3) -> f32 {
-    let h = h >> 28;
-    let u = if h < 8 { d.x } else { d.y };
-    let v = match h {
-        0..4 => d.y,
-        12 | 14 => d.x,
-        _ => d.z,
-    };
-    (if h & 1 == 0 { u } else { -u }) + (if h & 2 == 0 { v } else { -v })
-}
+/// The 12 edge directions of a cube, 4 of them twice. Looked up, because a branch on a hash is a coin toss.
+const EDGES: [Vec3; 16] = [
+    Vec3::new(1.0, 1.0, 0.0),
+    Vec3::new(-1.0, 1.0, 0.0),
+    Vec3::new(1.0, -1.0, 0.0),
+    Vec3::new(-1.0, -1.0, 0.0),
+    Vec3::new(1.0, 0.0, 1.0),
+    Vec3::new(-1.0, 0.0, 1.0),
+    Vec3::new(1.0, 0.0, -1.0),
+    Vec3::new(-1.0, 0.0, -1.0),
+    Vec3::new(0.0, 1.0, 1.0),
+    Vec3::new(0.0, -1.0, 1.0),
+    Vec3::new(0.0, 1.0, -1.0),
+    Vec3::new(0.0, -1.0, -1.0),
+    Vec3::new(1.0, 1.0, 0.0),
+    Vec3::new(0.0, -1.0, 1.0),
+    Vec3::new(-1.0, 1.0, 0.0),
+    Vec3::new(0.0, -1.0, -1.0),
+];
 
 /// The lattice cell of a coordinate below 2^31, and the place in it. Cheaper than `floor` where the baseline
 /// instruction set has none.
@@ -87,9 +111,15 @@ pub fn gradient2(seed: u32, p: Vec2) -> f32 {
 /// Gradient noise in space, about [-1, 1], zero at lattice points.
 pub fn gradient3(seed: u32, p: Vec3) -> f32 {
     let ((x, fx), (y, fy), (z, fz)) = (split(p.x), split(p.y), split(p.z));
-    let corner = |i: i32, j: i32, k: i32| {
-        let to_point = Vec3::new(fx - i as f32, fy - j as f32, fz - k as f32);
-        dot_gradient3(hash(seed, x + i, y + j, z + k), to_point)
+    // The eight corners share what each axis puts into their hashes.
+    let seed = spread_seed(seed);
+    let xs = [seed ^ spread_x(x), seed ^ spread_x(x + 1)];
+    let ys = [spread_y(y), spread_y(y + 1)];
+    let zs = [spread_z(z), spread_z(z + 1)];
+    let (dx, dy, dz) = ([fx, fx - 1.0], [fy, fy - 1.0], [fz, fz - 1.0]);
+    let corner = |i: usize, j: usize, k: usize| {
+        let h = stir(xs[i] ^ ys[j] ^ zs[k]);
+        EDGES[(h >> 28) as usize].dot(Vec3::new(dx[i], dy[j], dz[k]))
     };
     let (u, v, w) = (fade(fx), fade(fy), fade(fz));
     let edge = |j, k| mix(corner(0, j, k), corner(1, j, k), u);

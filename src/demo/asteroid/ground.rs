@@ -52,10 +52,10 @@ impl Ground {
     /// The distance of the surface from the centre in unit direction `d`.
     pub fn radius(&self, d: Vec3) -> f32 {
         let f = self.features(d);
-        let hills = 0.020 * fbm3(11, 3.1 * d, Octaves::new(2));
-        let crags = 0.016 * (ridged3(12, 5.0 * d, Octaves::new(4)) - 0.5);
+        let hills = 0.014 * gradient3(11, 3.1 * d);
+        let crags = 0.018 * (ridged3(12, 5.0 * d, Octaves::new(3)) - 0.5);
         let gravel = Octaves {
-            count: 5,
+            count: 4,
             gain: 0.6,
         };
         let grain = 0.006 * fbm3(13, 40.0 * d, gravel);
@@ -74,7 +74,7 @@ impl Ground {
         c *= 1.0 + 0.35 * speckle + 0.25 * mottle;
         c = c.lerp(Vec3::new(0.20, 0.17, 0.145), 0.55 * f.hollow);
         c = c.lerp(Vec3::new(0.50, 0.46, 0.41), 0.55 * f.fresh);
-        let crest = ridged3(12, 5.0 * d, Octaves::new(4));
+        let crest = ridged3(12, 5.0 * d, Octaves::new(3));
         c *= mix(0.8, 1.2, smoothstep(0.3, 0.8, crest));
         if f.boulder.0 > 0.0 {
             let tint = mix(0.75, 1.35, unit(next(f.boulder.1)));
