@@ -1,0 +1,288 @@
+use super::super::draco::tests::{SHEET, sheet};
+use super::super::tests::load_bytes;
+use super::super::{LoadMeshError, load_mesh};
+use super::*;
+use crate::surface::NormalMode;
+use serde_json::{Value, json};
+
+const FLOAT: u32 = 5126;
+const U16: u32 = 5123;
+
+/// A square of 4 positions (bytes 0..48), 4 normalised u16 texture coordinates (48..64), 6 u16 indices (64..76).
+fn binary() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let corners = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    for [x, y] in corners {
+        bytes.extend([x, y, 0.0].iter().flat_map(|f| f.to_le_bytes()));
+    }
+    for [x, y] in corners {
+        let texcoord = [x, y].map(|c| (c * 65535.0) as u16);
+        bytes.extend(texcoord.iter().flat_map(|i| i.to_le_bytes()));
+    }
+    let indices = [0_u16, 1, 2, 0, 2, 3];
+    bytes.extend(indices.iter().flat_map(|i| i.to_le_bytes()));
+    bytes
+}
+
+fn document() -> Value {
+    let view = |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
+    json!({
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [
+            {"name": "parent", "translation": [0.0, 0.0, 5.0], "children": [1]},
+            {"name": "child", "scale": [-2.0, 1.0, 1.0], "mesh": 0},
+        ],
+        "meshes": [{"primitives": [{
+            "attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0,
+        }]}],
+        "materials": [{"name": "clay", "pbrMetallicRoughness": {
+            "baseColorFactor": [0.5, 0.25, 0.125, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.75,
+            "baseColorTexture": {"index": 0},
+        }}],
+        "textures": [{"source": 0}],
+        "images": [{"uri": "my%20color.png"}],
+        "accessors": [
+            {"bufferView": 0, "componentType": FLOAT, "count": 4, "type": "VEC3",
+             "min": [0.0, 0.0, 0.0], "max": [1.0, 1.0, 0.0]},
+            {"bufferView": 1, "componentType": U16, "count": 4, "type": "VEC2", "normalized": true},
+            {"bufferView": 2, "componentType": U16, "count": 6, "type": "SCALAR"},
+        ],
+        "bufferViews": [view(0, 48), view(48, 16), view(64, 12)],
+        "buffers": [{"byteLength": 76}],
+    })
+}
+
+fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
+    let mut json = document.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let total = 12 + 8 + json.len() + 8 + binary.len();
+    let mut bytes = b"glTF".to_vec();
+    bytes.extend(2_u32.to_le_bytes());
+    bytes.extend((total as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", &json[..]), (b"BIN\0", binary)] {
+        bytes.extend((chunk.len() as u32).to_le_bytes());
+        bytes.extend(kind);
+        bytes.extend(chunk);
+    }
+    bytes
+}
+
+fn load(document: &Value) -> Result<LoadedFile, LoadMeshError> {
+    load_bytes("m.glb", &glb(document, &binary()))
+}
+
+/// The document with the value at `pointer` replaced.
+fn with(pointer: &str, value: Value) -> Value {
+    let mut document = document();
+    *document.pointer_mut(pointer).unwrap() = value;
+    document
+}
+
+#[test]
+fn node_transforms_are_baked_and_v_points_up() {
+    let mut file = load(&document()).unwrap();
+    let part = file.parts.remove(0);
+    assert_eq!(part.name, "child");
+    assert_eq!(part.mesh.positions[2], Vec3::new(-2.0, 1.0, 5.0));
+    assert_eq!(part.mesh.texcoords[0], Vec2::new(0.0, 1.0));
+    assert_eq!(part.mesh.texcoords[2], Vec2::new(1.0, 0.0));
+    let material = part.material.unwrap();
+    assert_eq!(material.name, "clay");
+    assert_eq!(material.base_color, Vec3::new(0.5, 0.25, 0.125));
+    assert_eq!(
+        (material.metallic, material.roughness),
+        (Some(0.0), Some(0.75))
+    );
+    assert!(
+        matches!(material.base_color_texture, Some(FileTexture::Path(p)) if p.ends_with("my color.png"))
+    );
+    // The node mirrors; outside is still outside.
+    let (mesh, _) = part.mesh.build(NormalMode::File).unwrap();
+    assert_eq!(mesh.normals(), [Vec3::Z; 4]);
+}
+
+#[test]
+fn strips_and_fans_turn_the_same_way_as_lists() {
+    for mode in [5, 6] {
+        let mut document = document();
+        document["meshes"][0]["primitives"][0]["mode"] = json!(mode);
+        let file = load(&document).unwrap();
+        // Indices 0 1 2 0 2 3 as a strip or fan: four triangles, some without an area.
+        let mesh = &file.parts[0].mesh;
+        assert_eq!(mesh.triangles.len(), 4);
+    }
+    let strip = triangles(Mode::TriangleStrip, &[0, 1, 2, 3], "").unwrap();
+    assert_eq!(strip, [[0, 1, 2], [1, 3, 2]]);
+    let fan = triangles(Mode::TriangleFan, &[0, 1, 2, 3], "").unwrap();
+    assert_eq!(fan, [[1, 2, 0], [2, 3, 0]]);
+    assert!(triangles(Mode::Triangles, &[0, 1, 2, 3], "").is_err());
+}
+
+#[test]
+fn buffers_may_be_files_or_data_uris() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.gltf");
+    let mut document = document();
+    document["buffers"][0]["uri"] = json!("the%20data.bin");
+    std::fs::write(&path, document.to_string()).unwrap();
+    let missing = load_mesh(&path).unwrap_err();
+    assert!(missing.to_string().contains("the data.bin"), "{missing}");
+    std::fs::write(folder.path().join("the data.bin"), binary()).unwrap();
+    assert_eq!(load_mesh(&path).unwrap().parts[0].mesh.triangles.len(), 2);
+
+    assert_eq!(base64("aGVsbG8=").unwrap(), b"hello");
+    assert_eq!(base64("+/8").unwrap(), [0xfb, 0xff]);
+    assert!(base64("a b").is_none());
+}
+
+#[test]
+fn a_file_cut_off_anywhere_is_refused() {
+    let whole = glb(&document(), &binary());
+    for length in (0..whole.len()).step_by(7).chain(0..40) {
+        assert!(load_bytes("m.glb", &whole[..length]).is_err(), "{length}");
+    }
+    let mut lying = whole;
+    lying[8..12].copy_from_slice(&3_u32.to_le_bytes());
+    assert!(load_bytes("m.glb", &lying).is_err());
+}
+
+#[test]
+fn accessors_outside_their_buffer_are_refused() {
+    for (pointer, value) in [
+        ("/accessors/0/count", json!(5)),
+        ("/accessors/0/count", json!(u64::MAX)),
+        ("/accessors/2/count", json!(0)),
+        ("/accessors/0/bufferView", json!(9)),
+        ("/accessors/1/componentType", json!(5125)),
+        ("/accessors/1/type", json!("VEC3")),
+        ("/bufferViews/2/byteOffset", json!(70)),
+        ("/bufferViews/2/byteOffset", json!(u64::MAX)),
+        ("/buffers/0/byteLength", json!(77)),
+        ("/meshes/0/primitives/0/material", json!(3)),
+        ("/meshes/0/primitives/0/attributes", json!({"NORMAL": 0})),
+        ("/meshes/0/primitives/0/indices", json!(0)),
+        ("/nodes/1/mesh", json!(1)),
+        ("/images/0", json!({})),
+    ] {
+        let result = load(&with(pointer, value.clone()));
+        // An image without a source costs the texture, not the mesh.
+        if pointer == "/images/0" {
+            let material = result.unwrap().parts.remove(0).material.unwrap();
+            assert!(material.base_color_texture.is_none());
+        } else {
+            assert!(result.is_err(), "{pointer} = {value}");
+        }
+    }
+}
+
+#[test]
+fn an_index_beyond_the_vertices_is_refused() {
+    let mut bytes = binary();
+    bytes[64..66].copy_from_slice(&4_u16.to_le_bytes());
+    let error = load_bytes("m.glb", &glb(&document(), &bytes)).unwrap_err();
+    assert!(matches!(
+        error.kind,
+        LoadMeshErrorKind::IndexOutOfRange {
+            index: 4,
+            count: 4,
+            ..
+        }
+    ));
+}
+
+#[test]
+fn a_node_that_is_its_own_ancestor_is_refused() {
+    let error = load(&with("/nodes/0/children", json!([0]))).unwrap_err();
+    assert!(error.to_string().contains("node 0"), "{error}");
+    assert!(load(&with("/scenes/0/nodes", json!([0, 1]))).is_err());
+}
+
+#[test]
+fn a_required_extension_is_refused_unless_it_leaves_the_shape_alone() {
+    let mut document = document();
+    document["extensionsRequired"] = json!(["KHR_materials_unlit"]);
+    assert!(load(&document).is_ok());
+    document["extensionsRequired"] = json!(["EXT_meshopt_compression"]);
+    let error = load(&document).unwrap_err();
+    assert!(
+        error.to_string().contains("EXT_meshopt_compression"),
+        "{error}"
+    );
+}
+
+/// The document over a Draco stream: its accessors have no buffer views.
+fn compressed_document(stream: &[u8]) -> Value {
+    let mut document = document();
+    document["extensionsUsed"] = json!([draco::EXTENSION]);
+    document["extensionsRequired"] = json!([draco::EXTENSION]);
+    document["meshes"][0]["primitives"][0]["extensions"] = json!({draco::EXTENSION: {
+        "bufferView": 0, "attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2},
+    }});
+    let accessors = document["accessors"].as_array_mut().unwrap();
+    let counts = [SHEET.vertices, SHEET.vertices, 3 * SHEET.triangles];
+    accessors[0]["max"] = json!([3.0, 2.0, 1.0]);
+    for (accessor, count) in accessors.iter_mut().zip(counts) {
+        accessor.as_object_mut().unwrap().remove("bufferView");
+        accessor["count"] = json!(count);
+    }
+    document["bufferViews"] = json!([{"buffer": 0, "byteLength": stream.len()}]);
+    document["buffers"] = json!([{"byteLength": stream.len()}]);
+    document
+}
+
+#[test]
+fn a_compressed_primitive_is_unpacked_with_v_up() {
+    let stream = sheet(7);
+    let document = compressed_document(&stream);
+    let mut file = load_bytes("m.glb", &glb(&document, &stream)).unwrap();
+    let mesh = file.parts.remove(0).mesh;
+    assert_eq!(mesh.triangles.len(), SHEET.triangles);
+    for (p, st) in mesh.positions.iter().zip(&mesh.texcoords) {
+        // The sheet is at y = 2 v with v down.
+        assert!((p.y - 2.0 * (1.0 - st.y)).abs() < 1e-3, "{p} at {st}");
+    }
+}
+
+#[test]
+fn broken_compressed_primitives_are_refused() {
+    let stream = sheet(7);
+    let extension = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression";
+    for (pointer, value) in [
+        ("", json!(1)),
+        ("/bufferView", json!(1)),
+        ("/bufferView", json!(-1)),
+        ("/attributes", json!({"NORMAL": 1, "TEXCOORD_0": 2})),
+        ("/attributes/POSITION", json!(7)),
+        ("/attributes", json!({"POSITION": 0})),
+    ] {
+        let mut document = compressed_document(&stream);
+        let pointer = format!("{extension}{pointer}");
+        *document.pointer_mut(&pointer).unwrap() = value.clone();
+        let result = load_bytes("m.glb", &glb(&document, &stream));
+        assert!(result.is_err(), "{pointer} = {value}");
+    }
+    // Announced counts, and accessors that stand without the extension.
+    let mut few = compressed_document(&stream);
+    few["accessors"][2]["count"] = json!(3);
+    assert!(load_bytes("m.glb", &glb(&few, &stream)).is_err());
+    let mut beyond = compressed_document(&stream);
+    beyond["accessors"][0]["max"] = json!([2.0, 2.0, 1.0]);
+    let error = load_bytes("m.glb", &glb(&beyond, &stream)).unwrap_err();
+    assert!(error.to_string().contains("outside"), "{error}");
+    let mut bare = compressed_document(&stream);
+    bare["meshes"][0]["primitives"][0]["extensions"] = json!({});
+    assert!(load_bytes("m.glb", &glb(&bare, &stream)).is_err());
+    for length in (0..stream.len()).step_by(11) {
+        let document = compressed_document(&stream[..length]);
+        let error = load_bytes("m.glb", &glb(&document, &stream[..length])).unwrap_err();
+        assert!(error.to_string().contains("Draco"), "{error}");
+    }
+}
+
+#[test]
+fn a_scene_without_meshes_has_no_faces() {
+    let error = load(&with("/scenes/0/nodes", json!([]))).unwrap_err();
+    assert!(matches!(error.kind, LoadMeshErrorKind::NoFaces));
+}
