@@ -125,14 +125,14 @@ static inline bool has_occluded_filter(const struct pm_geometry *g, const query_
 #endif
 }
 
-static inline void fill_hit(struct RTCHit *hit, const pm_hit *at, unsigned prim, unsigned geom,
+static inline void fill_hit(struct RTCHit *hit, const pm_hit *at, unsigned geom,
                             const query_context *context) {
   hit->Ng_x = at->ng[0];
   hit->Ng_y = at->ng[1];
   hit->Ng_z = at->ng[2];
   hit->u = at->u;
   hit->v = at->v;
-  hit->primID = prim;
+  hit->primID = at->prim;
   hit->geomID = geom;
   memcpy(hit->instID, context->instID, sizeof hit->instID);
 #ifdef RTC_GEOMETRY_INSTANCE_ARRAY
@@ -162,7 +162,7 @@ static inline bool first_accepted(const query *q, pm_ray *ray, struct RTCHit *hi
       return false;
     if (!(at.t > ray->tnear && at.t < limit))
       return false;
-    fill_hit(hit, &at, q->prim, q->geom, q->context);
+    fill_hit(hit, &at, q->geom, q->context);
     ray->tfar = at.t;
     int valid = -1;
     struct RTCFilterFunctionNArguments candidate = {
@@ -253,7 +253,7 @@ static void unpack_hit(pm_scene_hit *out, float t, const struct RTCHit *hit) {
   out->at.ng[0] = hit->Ng_x;
   out->at.ng[1] = hit->Ng_y;
   out->at.ng[2] = hit->Ng_z;
-  out->prim = hit->primID;
+  out->at.prim = hit->primID;
   out->geom = hit->geomID;
   for (unsigned l = 0; l < PM_INSTANCE_LEVELS; l++)
     out->inst[l] = hit->instID[l];

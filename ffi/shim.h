@@ -46,16 +46,17 @@ typedef struct pm_ray {
   uint32_t flags;
 } pm_ray;
 
-/* Where a ray meets one primitive. ng need not be of unit length. */
+/* Where a ray meets one primitive. ng need not be of unit length; prim is the primID to report, which need not
+ * be the number of the primitive that was tested: one primitive may hold many. */
 typedef struct pm_hit {
   float t, u, v;
   float ng[3];
+  uint32_t prim;
 } pm_hit;
 
 /* Where a ray meets a scene. ng is in object space, as the hit test or Embree gave it. */
 typedef struct pm_scene_hit {
   pm_hit at;
-  uint32_t prim;
   uint32_t geom;
   uint32_t inst[PM_INSTANCE_LEVELS];
 } pm_scene_hit;

@@ -136,7 +136,7 @@ fn by_loop(world: &World, ray: &Ray) -> Option<Hit> {
                 Shape::Displaced(prisms) => prisms.intersect(prim, &local),
                 Shape::Triangles(mesh) => triangle(mesh, prim, &local),
             };
-            if let Some(PrismHit { t, u, v, ng }) = hit
+            if let Some(PrismHit { prim, t, u, v, ng }) = hit
                 && best.is_none_or(|best| t < best.t)
             {
                 best = Some(Hit {
@@ -166,6 +166,7 @@ fn triangle(mesh: &BaseMesh, prim: u32, ray: &Ray) -> Option<PrismHit> {
     let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
     let (t, u, v) = (t as f32, u as f32, v as f32);
     (inside && ray.tnear < t && t < ray.tfar).then(|| PrismHit {
+        prim,
         t,
         u,
         v,

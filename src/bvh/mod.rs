@@ -191,7 +191,7 @@ impl BvhTracer {
     }
 
     fn to_hit(&self, closest: Closest) -> Hit {
-        let Closest { hit, top, prim } = closest;
+        let Closest { hit, top } = closest;
         let (geom, inst) = match self.places[top as usize].to_object {
             Some(_) => (0, top),
             None => (top, INVALID_ID),
@@ -200,7 +200,7 @@ impl BvhTracer {
             t: hit.t,
             u: hit.u,
             v: hit.v,
-            prim,
+            prim: hit.prim,
             geom,
             inst: [inst],
             ng: hit.ng,

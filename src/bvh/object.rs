@@ -52,7 +52,7 @@ impl Primitives for BaseMesh {
 
     #[inline]
     fn intersect(&self, prim: u32, sheared: &ShearedRay, ray: &Ray) -> Option<PrismHit> {
-        sheared.intersect(self.corners(prim), ray)
+        sheared.intersect(prim, self.corners(prim), ray)
     }
 
     #[inline]
@@ -69,12 +69,11 @@ impl Primitives for BaseMesh {
 pub(super) struct Closest {
     pub(super) hit: PrismHit,
     pub(super) top: u32,
-    pub(super) prim: u32,
 }
 
 impl Closest {
     fn beats(&self, other: &Self) -> bool {
-        let ids = |c: &Self| (c.top, c.prim);
+        let ids = |c: &Self| (c.top, c.hit.prim);
         self.hit.t < other.hit.t || (self.hit.t == other.hit.t && ids(self) < ids(other))
     }
 
@@ -158,7 +157,7 @@ fn closest<P: Primitives>(
     let start = ray;
     tree.traverse(&start, |prim| {
         if let Some(hit) = primitives.intersect(prim, &prepared, &ray) {
-            let found = Closest { hit, top, prim };
+            let found = Closest { hit, top };
             if best.is_none_or(|best| found.beats(&best)) {
                 ray.tfar = found.tfar();
                 *best = Some(found);

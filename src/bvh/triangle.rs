@@ -38,7 +38,7 @@ impl ShearedRay {
     /// The hit of the triangle `corners`, from either side, with t in the open interval of `ray`, from
     /// which `self` was made. `ng` points to the side from which the corners run counter-clockwise.
     #[inline]
-    pub(super) fn intersect(&self, corners: [Vec3; 3], ray: &Ray) -> Option<PrismHit> {
+    pub(super) fn intersect(&self, prim: u32, corners: [Vec3; 3], ray: &Ray) -> Option<PrismHit> {
         let [a, b, c] = corners.map(|corner| self.sheared(corner));
         let areas = signed_areas(a, b, c);
         let some_negative = areas.cmplt(Vec3::ZERO).any();
@@ -50,6 +50,7 @@ impl ShearedRay {
         let b_coords = areas / areas.element_sum();
         let t = b_coords.dot(Vec3::new(a.z, b.z, c.z)) * self.shear.z;
         (ray.tnear < t && t < ray.tfar).then(|| PrismHit {
+            prim,
             t,
             u: b_coords.y,
             v: b_coords.z,
@@ -101,7 +102,7 @@ mod tests {
     const CORNERS: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 
     fn hit(ray: &Ray, corners: [Vec3; 3]) -> Option<PrismHit> {
-        ShearedRay::new(ray).intersect(corners, ray)
+        ShearedRay::new(ray).intersect(0, corners, ray)
     }
 
     #[test]

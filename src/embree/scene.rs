@@ -304,8 +304,8 @@ impl Scene {
                 u: 0.0,
                 v: 0.0,
                 ng: [0.0; 3],
+                prim: 0,
             },
-            prim: 0,
             geom: 0,
             inst: [0; MAX_INSTANCE_LEVELS],
         };
@@ -339,7 +339,7 @@ pub(super) fn hit_from_raw(hit: &sys::pm_scene_hit) -> Hit {
         t: hit.at.t,
         u: hit.at.u,
         v: hit.at.v,
-        prim: hit.prim,
+        prim: hit.at.prim,
         geom: hit.geom,
         inst: hit.inst,
         ng: unit(Vec3::from_array(hit.at.ng)),

@@ -166,6 +166,7 @@ impl<T: HitTest + 'static> Stored<T> {
             u: found.u,
             v: found.v,
             ng: found.ng.to_array(),
+            prim: found.prim,
         };
         // SAFETY: the shim's pointer is valid for a write.
         unsafe { hit.write(raw) };

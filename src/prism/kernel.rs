@@ -54,6 +54,7 @@ impl Kernel {
             .unwrap_or_else(|| root.ng.normalize_or_zero().as_vec3());
         let (u, v) = (root.u.clamp(0.0, 1.0) as f32, root.v.clamp(0.0, 1.0) as f32);
         Some(PrismHit {
+            prim,
             t: root.t as f32,
             u,
             v: v.min(1.0 - u),

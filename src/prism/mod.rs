@@ -34,6 +34,8 @@ pub use simd::SimdLevel;
 /// Where a ray first meets the surface inside one prism.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrismHit {
+    /// Base triangle.
+    pub prim: u32,
     /// Ray parameter.
     pub t: f32,
     /// Barycentric coordinate of vertex 1.
@@ -99,7 +101,7 @@ impl Prisms {
         self.march
     }
 
-    /// Number of prisms = number of base triangles.
+    /// Number of primitives that a backend traces. A hit names its base triangle.
     pub fn len(&self) -> usize {
         self.records.len()
     }

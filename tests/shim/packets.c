@@ -25,7 +25,6 @@ static void ball_bounds(const void *user, uint32_t prim, float out[6]) {
 
 static bool ball_intersect(const void *user, uint32_t prim, const pm_ray *ray, pm_hit *hit) {
   (void)user;
-  (void)prim;
   float a = 0, b = 0, c = -1;
   for (int k = 0; k < 3; k++) {
     a += ray->dir[k] * ray->dir[k];
@@ -38,6 +37,7 @@ static bool ball_intersect(const void *user, uint32_t prim, const pm_ray *ray, p
   if (!(t > ray->tnear && t < ray->tfar))
     return false;
   hit->t = t;
+  hit->prim = prim;
   hit->u = 0.25f;
   hit->v = 0.5f;
   for (int k = 0; k < 3; k++)

@@ -66,6 +66,7 @@ impl HitTest for Balls {
             .find(|&t| t > ray.tnear && t < ray.tfar)?;
         let ng = (o + f64::from(t) * d).normalize().as_vec3();
         Some(PrismHit {
+            prim,
             t,
             u: 0.25,
             v: 0.5,
