@@ -1,6 +1,6 @@
 //! Embree and obvhs side by side: `cargo bench --bench backends`.
 //!
-//! The same unit sphere as prisms (1280 base triangles, a 16-bit map of rock, uniform march of 1 texel) and as
+//! The same unit sphere as prisms (1280 base triangles, a 16-bit map of rock, the exact march) and as
 //! plain triangles (327 680 of them, undisplaced). One thread traces; Embree builds on all cores, obvhs on one.
 //! Options after `--`: `--map TEXELS`, `--size PIXELS`, `--rounds N`. Prints a Markdown table.
 
@@ -17,7 +17,7 @@ use prismarch::embree::{
     BuildQuality, Device, DeviceOptions, EmbreeOptions, EmbreeTracer, Scene, SceneBuilder,
     SceneOptions, UserGeometry,
 };
-use prismarch::prism::Prisms;
+use prismarch::prism::{March, Prisms};
 use prismarch::trace::{Object, Placement, Shape, Tracer, World};
 
 struct Case {
@@ -75,7 +75,7 @@ fn main() {
     let base = sphere(3);
     let fine = sphere(7);
 
-    let displaced = Shape::Displaced(Arc::new(prisms(&base, &map, 1.0)));
+    let displaced = Shape::Displaced(Arc::new(prisms(&base, &map, March::default())));
     let mut cases = [
         case(
             format!("{} prisms", base.triangles().len()),

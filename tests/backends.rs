@@ -15,7 +15,7 @@ use std::sync::Arc;
 use common::scene::{prisms, random, rock_map, sphere};
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use prismarch::bvh::{BvhError, BvhTracer};
-use prismarch::prism::PrismHit;
+use prismarch::prism::{March, PrismHit};
 use prismarch::ray::Ray;
 use prismarch::surface::BaseMesh;
 use prismarch::trace::{Hit, INVALID_ID, Object, Placement, Shape, Tracer, World};
@@ -76,7 +76,7 @@ fn displaced(subdivisions: u32) -> Shape {
     Shape::Displaced(Arc::new(prisms(
         &sphere(subdivisions),
         &rock_map(64, 7),
-        1.0,
+        March::default(),
     )))
 }
 

@@ -82,15 +82,19 @@ fn texcoords(face: [Vec3; 3]) -> [Vec2; 3] {
 }
 
 /// Prisms around `mesh` displaced by `map` with a range of 0 .. [`RANGE`].
-pub fn prisms(mesh: &Arc<BaseMesh>, map: &Arc<DisplacementMap>, texels: f32) -> Prisms {
+pub fn prisms(mesh: &Arc<BaseMesh>, map: &Arc<DisplacementMap>, march: March) -> Prisms {
     let displacement = Displacement::new(RANGE);
     let surface = DisplacedSurface::new(mesh.clone(), map.clone(), displacement)
         .expect("a sphere that can be displaced");
-    let march = March::Uniform {
+    Prisms::new(Arc::new(surface), march).expect("a step above zero")
+}
+
+/// The paper's march with a step in texels.
+pub fn uniform(texels: f32) -> March {
+    March::Uniform {
         step: Step::Texels(texels),
         jitter: false,
-    };
-    Prisms::new(Arc::new(surface), march).expect("a step above zero")
+    }
 }
 
 /// A rocky 16-bit map of `size` x `size` texels that repeats without a seam: ridged gradient noise

@@ -35,7 +35,8 @@ pub struct Args {
     scene: Option<PathBuf>,
     #[command(flatten)]
     surface: SurfaceArgs,
-    /// How the surface is looked for inside a prism [default: the scene's, or uniform]
+    /// How the surface is looked for inside a prism [default: the scene's, or exact; uniform with --dt, --dt-world or
+    /// --jitter]
     #[arg(long, value_enum)]
     march: Option<MarchKind>,
     /// Step of the uniform march in texels of the map [default: the scene's, or 1]
@@ -85,6 +86,8 @@ struct SurfaceArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MarchKind {
+    /// The first crossing, whatever the map: no step
+    Exact,
     /// Equal steps along the ray, as in the paper
     Uniform,
 }
@@ -143,7 +146,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut rays = RayReader::open(&args.rays)?;
     let mut loaded = args.load()?;
     super::warn(&loaded.warnings);
-    args.override_march(&mut loaded.scene);
+    args.override_march(&mut loaded.scene)?;
     let world = loaded.scene.world()?;
     let engine = args.engine.build(&world)?;
     let query = Query {
@@ -194,10 +197,7 @@ impl Args {
                         midlevel: self.surface.midlevel,
                         uv: UvTransform::default(),
                     },
-                    march: March::Uniform {
-                        step: Step::Texels(1.0),
-                        jitter: false,
-                    },
+                    march: March::default(),
                 })?)
             }
             _ => Err(CliError::Usage(
@@ -207,20 +207,43 @@ impl Args {
     }
 
     /// What the command line says of the march wins over the scene.
-    fn override_march(&self, scene: &mut Scene) {
+    fn override_march(&self, scene: &mut Scene) -> Result<(), CliError> {
         let step_here = match (self.dt, self.dt_world) {
             (Some(texels), _) => Some(Step::Texels(texels)),
             (None, Some(length)) => Some(Step::World(length)),
             (None, None) => None,
         };
+        let has_steps = step_here.is_some() || self.jitter.is_some();
+        let kind = match (self.march, has_steps) {
+            (Some(MarchKind::Exact), true) => {
+                return Err(CliError::Usage(
+                    "--dt, --dt-world and --jitter belong to the uniform march; the exact one has no step"
+                        .into(),
+                ));
+            }
+            (None, true) => Some(MarchKind::Uniform),
+            (kind, _) => kind,
+        };
         for object in &mut scene.objects {
             let ObjectShape::Displaced(_, march) = &mut object.shape else {
                 continue;
             };
-            let March::Uniform { step, jitter } = march;
-            *step = step_here.unwrap_or(*step);
-            *jitter |= self.jitter.is_some();
+            let (step, jitter) = match *march {
+                March::Uniform { step, jitter } => (step, jitter),
+                March::Exact => (Step::Texels(1.0), false),
+            };
+            match kind {
+                None => {}
+                Some(MarchKind::Exact) => *march = March::Exact,
+                Some(MarchKind::Uniform) => {
+                    *march = March::Uniform {
+                        step: step_here.unwrap_or(step),
+                        jitter: jitter || self.jitter.is_some(),
+                    };
+                }
+            }
         }
+        Ok(())
     }
 }
 

@@ -7,16 +7,22 @@
 //! (`sides`); along what is left the surface is looked for (`march`), and the crossing is polished on the
 //! surface's definition ([`crate::surface`]). This room knows no Embree, no scene and no picture.
 
+mod cluster;
+mod cull;
+mod curve;
+mod exact;
 mod frame;
 #[allow(unsafe_code)] // SIMD stamps
 mod kernel;
 mod march;
 mod normal;
 mod path;
+mod ray_frame;
 mod sides;
 mod simd;
 #[cfg(test)]
 mod tests;
+mod uniform;
 
 use std::sync::Arc;
 
@@ -24,9 +30,9 @@ use glam::{DVec3, Vec3};
 
 use crate::ray::{Aabb, Ray};
 use crate::surface::{DisplacedSurface, SurfacePoint};
-use frame::Prism;
+use exact::ExactPrisms;
 use kernel::Kernel;
-use path::HeightUnits;
+use uniform::UniformPrisms;
 
 pub use march::{March, MarchError, Step};
 pub use simd::SimdLevel;
@@ -49,40 +55,36 @@ pub struct PrismHit {
 /// A displaced surface as a set of prisms, one per base triangle: what a backend traces.
 pub struct Prisms {
     surface: Arc<DisplacedSurface>,
-    records: Vec<Prism>,
-    units: HeightUnits,
+    parts: Parts,
     march: March,
     kernel: Kernel,
 }
 
-/// Below this n_i . Ng a prism is bent: its rays take the slower exact route.
-const BENT: f32 = 0.1;
+/// What a march reads beside mesh and map.
+enum Parts {
+    Exact(ExactPrisms),
+    Uniform(UniformPrisms),
+}
 
 impl Prisms {
     /// Builds the prisms; the kernel is chosen once, for this machine.
     pub fn new(surface: Arc<DisplacedSurface>, march: March) -> Result<Self, MarchError> {
         let march = march.validate()?;
-        let count = surface.mesh().triangles().len() as u32;
-        let records: Vec<Prism> = (0..count)
-            .map(|prim| Prism::new(&surface.patch(prim)))
-            .collect();
-        let unit = surface.map().texels().unit();
-        let units = HeightUnits {
-            texel_per_world: unit / surface.displacement().scale,
-            texel_midlevel: unit * surface.displacement().midlevel,
+        let parts = match march {
+            March::Exact => Parts::Exact(ExactPrisms::new(&surface)),
+            March::Uniform { .. } => Parts::Uniform(UniformPrisms::new(&surface)),
         };
         Ok(Self {
             surface,
-            records,
-            units,
+            parts,
             march,
-            kernel: Kernel::new(SimdLevel::detect()),
+            kernel: Kernel::new(march, SimdLevel::detect()),
         })
     }
 
     /// The same prisms with kernels of a given level (for tests and benches); `None` if this machine lacks it.
     pub fn with_simd(mut self, level: SimdLevel) -> Option<Self> {
-        self.kernel = Kernel::new(level);
+        self.kernel = Kernel::new(self.march, level);
         level.is_supported().then_some(self)
     }
 
@@ -103,28 +105,48 @@ impl Prisms {
 
     /// Number of primitives that a backend traces. A hit names its base triangle.
     pub fn len(&self) -> usize {
-        self.records.len()
+        match &self.parts {
+            Parts::Exact(exact) => exact.clusters.len(),
+            Parts::Uniform(uniform) => uniform.records.len(),
+        }
     }
 
     /// Never true: a base mesh has at least one triangle.
     pub fn is_empty(&self) -> bool {
-        self.records.is_empty()
+        self.len() == 0
     }
 
-    /// Bytes beside mesh and map: 108 per base triangle.
+    /// Bytes beside mesh and map: 108 per base triangle (the exact march's go in groups of eight).
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.records[..])
+        match &self.parts {
+            Parts::Exact(exact) => size_of_val(&exact.clusters[..]),
+            Parts::Uniform(uniform) => size_of_val(&uniform.records[..]),
+        }
+    }
+
+    /// Conservative bounds of what one traced primitive holds of the surface.
+    pub fn bounds(&self, primitive: u32) -> Aabb {
+        let bounds = match &self.parts {
+            Parts::Exact(exact) => {
+                let cluster = &exact.clusters[primitive as usize];
+                (0..exact.len(primitive as usize)).fold(Aabb::EMPTY, |bounds, lane| {
+                    bounds.union(self.prism_bounds(cluster.prim(lane), cluster.offsets(lane)))
+                })
+            }
+            Parts::Uniform(uniform) => {
+                let record = &uniform.records[primitive as usize];
+                self.prism_bounds(primitive, record.offsets())
+            }
+        };
+        const ULPS: f32 = 16.0;
+        bounds.padded(ULPS)
     }
 
     /// Conservative bounds of the surface over one base triangle: every point is sum b_i (v_i + w n_i) for one w of
     /// the range, so it is in the hull of six corners; and no further than the largest |D| from the triangle.
-    pub fn bounds(&self, prim: u32) -> Aabb {
+    fn prism_bounds(&self, prim: u32, offsets: [f32; 2]) -> Aabb {
         let patch = self.surface.patch(prim);
-        let record = &self.records[prim as usize];
-        let ([low, high], offsets) = (
-            record.range().map(f64::from),
-            record.offsets().map(f64::from),
-        );
+        let offsets = offsets.map(f64::from);
         let (mut hull_min, mut hull_max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for (&v, &n) in patch.vertices.iter().zip(&patch.normals) {
@@ -133,25 +155,25 @@ impl Prisms {
                 (hull_min, hull_max) = (hull_min.min(v + w * n), hull_max.max(v + w * n));
             }
         }
-        let reach = low.abs().max(high.abs());
-        let bounds = Aabb {
+        // w |N'| = D and |N'| <= 1.
+        let reach = offsets[0].abs().max(offsets[1].abs());
+        Aabb {
             min: hull_min.max(min - reach).as_vec3(),
             max: hull_max.min(max + reach).as_vec3(),
-        };
-        const ULPS: f32 = 16.0;
-        bounds.padded(ULPS)
+        }
     }
 
-    /// The first intersection of `ray` with the surface over base triangle `prim`, with t in (tnear, tfar).
+    /// The first intersection of `ray` with what one traced primitive holds of the surface, with t in (tnear, tfar).
+    /// The ray must be [valid](Ray::is_valid).
     #[inline]
-    pub fn intersect(&self, prim: u32, ray: &Ray) -> Option<PrismHit> {
-        self.kernel.intersect(self, prim, ray)
+    pub fn intersect(&self, primitive: u32, ray: &Ray) -> Option<PrismHit> {
+        self.kernel.intersect(self, primitive, ray)
     }
 
     /// Whether there is any.
     #[inline]
-    pub fn occluded(&self, prim: u32, ray: &Ray) -> bool {
-        self.kernel.occluded(self, prim, ray)
+    pub fn occluded(&self, primitive: u32, ray: &Ray) -> bool {
+        self.kernel.occluded(self, primitive, ray)
     }
 
     /// All a shader wants to know of the point (u, v) over base triangle `prim`.

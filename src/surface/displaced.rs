@@ -155,12 +155,16 @@ impl DisplacedSurface {
         (d(low).min(d(high)), d(low).max(d(high)))
     }
 
+    /// Where in the map the corners of a triangle are: its texture coordinates after the UV transform.
+    pub fn corner_texcoords(&self, triangle: u32) -> [Vec2; 3] {
+        self.mesh
+            .corner_texcoords(triangle)
+            .map(|st| self.uv.transform_point2(st))
+    }
+
     /// The piece of the surface over one base triangle.
     pub fn patch(&self, triangle: u32) -> Patch<'_> {
-        let texcoords = self
-            .mesh
-            .corner_texcoords(triangle)
-            .map(|st| self.uv.transform_point2(st).as_dvec2());
+        let texcoords = self.corner_texcoords(triangle).map(|st| st.as_dvec2());
         let wrap = self.map.wrap();
         let periods = DVec2::new(
             wrap.whole_periods(texcoords[0].x),

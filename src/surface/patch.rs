@@ -69,6 +69,20 @@ impl Patch<'_> {
         [a.min(b), a.max(b)]
     }
 
+    /// The range of w = D/|N'| over the triangle, conservative, and never empty.
+    pub fn offsets(&self) -> [f32; 2] {
+        let [low, high] = self.range();
+        let [a, b, c] = self.vertices;
+        let size = (b - a).abs().max((c - a).abs()).max_element();
+        let slack = 1e-6 * (low.abs().max(high.abs()) + size);
+        let stretch = 1.000_001 / self.shortest_normal();
+        let (low, high) = (low - slack, high + slack);
+        [
+            low.min(low * stretch) as f32,
+            high.max(high * stretch) as f32,
+        ]
+    }
+
     /// |N'(b)| at its smallest over the triangle, from below: |N'|^2 = 1 - sum b_i b_j |n_i - n_j|^2 and the sum
     /// of the b_i b_j is at most 1/3. Never less than [`Self::LEAST_NORMAL`].
     pub fn shortest_normal(&self) -> f64 {

@@ -1,6 +1,7 @@
 //! Ways to find the surface along a path, and the root that all of them end in.
 
 pub mod bent;
+pub mod exact;
 pub mod polish;
 pub mod uniform;
 
@@ -16,6 +17,8 @@ pub enum Step {
 /// How the surface is looked for inside a prism.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum March {
+    /// The first crossing of the ray and the surface, whatever the map: no step, nothing is missed.
+    Exact,
     /// The paper's march: equal steps along the ray.
     Uniform {
         /// Step length: greater than 0.
@@ -27,12 +30,9 @@ pub enum March {
 }
 
 impl Default for March {
-    /// One texel per step, no jitter.
+    /// The exact march.
     fn default() -> Self {
-        Self::Uniform {
-            step: Step::Texels(1.0),
-            jitter: false,
-        }
+        Self::Exact
     }
 }
 
@@ -50,7 +50,10 @@ impl March {
         let Self::Uniform {
             step: Step::Texels(found) | Step::World(found),
             ..
-        } = self;
+        } = self
+        else {
+            return Ok(self);
+        };
         if found.is_finite() && found > 0.0 {
             Ok(self)
         } else {

@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 
+use crate::prism::PrismHit;
 use crate::ray::Ray;
 use crate::surface::{Patch, solve};
 
@@ -23,6 +24,24 @@ pub struct Root {
 }
 
 impl Root {
+    /// As a backend reports it.
+    #[inline]
+    pub fn to_hit(self, prim: u32) -> PrismHit {
+        let ng = self
+            .ng
+            .as_vec3()
+            .try_normalize()
+            .unwrap_or_else(|| self.ng.normalize_or_zero().as_vec3());
+        let (u, v) = (self.u.clamp(0.0, 1.0) as f32, self.v.clamp(0.0, 1.0) as f32);
+        PrismHit {
+            prim,
+            t: self.t as f32,
+            u,
+            v: v.min(1.0 - u),
+            ng,
+        }
+    }
+
     /// Whether the root is on its base triangle and the ray sees it. Neighbours overlap by a hair rather than
     /// part by one.
     pub fn is_hit(&self, ray: &Ray) -> bool {

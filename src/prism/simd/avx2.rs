@@ -9,6 +9,7 @@
 
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
+use std::sync::atomic::AtomicU32;
 
 use super::{Grid, LANES, Lanes};
 use crate::surface::Texels;
@@ -35,6 +36,8 @@ lanewise!(Mul, mul, _mm256_mul_ps);
 lanewise!(Div, div, _mm256_div_ps);
 
 impl Lanes for Avx2 {
+    type Quad = super::avx2_quad::Avx2Quad;
+
     #[inline(always)]
     fn splat(x: f32) -> Self {
         // SAFETY: called in AVX2 kernels only (module documentation).
@@ -53,6 +56,13 @@ impl Lanes for Avx2 {
         // SAFETY: AVX is there; an unaligned store of 8 floats into an array of 8.
         unsafe { _mm256_storeu_ps(out.as_mut_ptr(), self.0) };
         out
+    }
+
+    #[inline(always)]
+    fn from_bits(bits: &[AtomicU32; LANES]) -> Self {
+        // SAFETY: AVX is there; an unaligned load of 8 words from an array of 8. x86 reads each aligned 32-bit word of
+        // a vector load whole, so a word that another thread stores meanwhile is seen old or new.
+        Self(unsafe { _mm256_loadu_ps(bits.as_ptr().cast()) })
     }
 
     #[inline(always)]
@@ -86,6 +96,27 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: AVX is there wherever an `Avx2` is.
+        Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+
+    #[inline(always)]
+    fn select_negative(self, a: Self, b: Self) -> Self {
+        // SAFETY: AVX is there wherever an `Avx2` is.
+        Self(unsafe { _mm256_blendv_ps(b.0, a.0, self.0) })
+    }
+
+    #[inline(always)]
+    fn next_of(self, rest: Self) -> Self {
+        // SAFETY: AVX2 is there wherever an `Avx2` is.
+        unsafe {
+            let first = _mm256_broadcastss_ps(_mm256_castps256_ps128(rest.0));
+            Self(_mm256_blend_ps::<0x80>(self.next().0, first))
+        }
+    }
+
+    #[inline(always)]
     fn next(self) -> Self {
         // SAFETY: AVX2 is there wherever an `Avx2` is.
         unsafe {
@@ -111,6 +142,23 @@ impl Lanes for Avx2 {
     fn sign_mask(self) -> u32 {
         // SAFETY: AVX is there wherever an `Avx2` is.
         unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+
+    #[inline(always)]
+    fn block_ranges(level: &super::TmpLevel, i: Self, j: Self) -> [Self; 2] {
+        let inside = |i: Self, n: usize| i.max(Self::splat(0.0)).min(Self::splat((n - 1) as f32));
+        let (i, j) = (inside(i, level.width), inside(j, level.height));
+        // SAFETY: AVX2 is there; index in bounds by the lines above.
+        unsafe {
+            let stride = _mm256_set1_epi32(level.width as i32);
+            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
+            let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
+            let (low, high) = pair::<16>(_mm256_i32gather_epi32::<4>(
+                level.entries.as_ptr().cast(),
+                index,
+            ));
+            [low, high]
+        }
     }
 
     #[inline(always)]

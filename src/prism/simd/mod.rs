@@ -4,18 +4,24 @@
 //! when the prisms are made, and the chosen functions are kept as pointers.
 
 mod portable;
+mod quad;
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod avx2_quad;
 
 use std::ops::{Add, Div, Mul, Sub};
+use std::sync::atomic::AtomicU32;
 
 use crate::surface::{DisplacementMap, Texels, Wrap};
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
 pub(crate) use portable::Portable;
+pub(crate) use quad::Quad;
 
 /// The instruction set of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,9 +70,14 @@ pub(crate) const LANES: usize = 8;
 pub(crate) trait Lanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
+    /// The f64 lanes that go with these.
+    type Quad: Quad;
+
     fn splat(x: f32) -> Self;
     fn from_array(x: [f32; LANES]) -> Self;
     fn to_array(self) -> [f32; LANES];
+    /// The floats whose bits are stored; each is read whole, whoever writes meanwhile.
+    fn from_bits(bits: &[AtomicU32; LANES]) -> Self;
     /// self * a + b, fused where the machine can.
     fn mul_add(self, a: Self, b: Self) -> Self;
     /// `other` where either is NaN.
@@ -75,15 +86,73 @@ pub(crate) trait Lanes:
     fn max(self, other: Self) -> Self;
     fn floor(self) -> Self;
     fn sqrt(self) -> Self;
+    fn abs(self) -> Self;
+    /// `a` where the sign bit of `self` is set, `b` elsewhere.
+    fn select_negative(self, a: Self, b: Self) -> Self;
     /// Lane k becomes lane k + 1; the last stays.
     fn next(self) -> Self;
+    /// Lane k becomes lane k + 1; the last is the first of `rest`.
+    fn next_of(self, rest: Self) -> Self;
     /// The largest lane.
     fn max_lane(self) -> f32;
     /// Bit k: lane k's sign bit.
     fn sign_mask(self) -> u32;
+    /// Smallest and largest stored texel of the blocks (i, j) of a level, integers in float lanes. Blocks outside the
+    /// level, and NaN, are moved inside first.
+    fn block_ranges(level: &TmpLevel, i: Self, j: Self) -> [Self; 2];
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), integers in float lanes.
     /// Cells outside the grid, and NaN, are moved inside first.
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4];
+}
+
+pub struct TmpLevel {
+    pub shift: u32,
+    pub width: usize,
+    pub height: usize,
+    pub entries: Vec<u32>,
+}
+
+pub fn tmp_levels(map: &DisplacementMap) -> Vec<TmpLevel> {
+    let (w, h) = map.size();
+    let Texels::U16(t) = map.texels() else { return vec![] };
+    let mut levels = vec![];
+    let mut shift = 2;
+    loop {
+        let b = 1usize << shift;
+        let (lw, lh) = (w.div_ceil(b), h.div_ceil(b));
+        let mut entries = vec![0u32; lw * lh + 4];
+        for j in 0..lh {
+            for i in 0..lw {
+                let (mut lo, mut hi) = (u16::MAX, 0u16);
+                if shift == 2 {
+                    for y in 0..=2 * b {
+                        for x in 0..=2 * b {
+                            let tx = map.wrap().texel((i * b + x) as i64, w);
+                            let ty = map.wrap().texel((j * b + y) as i64, h);
+                            let v = t[ty * map.stride() + tx];
+                            lo = lo.min(v);
+                            hi = hi.max(v);
+                        }
+                    }
+                } else {
+                    let prev: &TmpLevel = levels.last().unwrap();
+                    for (di, dj) in [(0, 0), (2, 0), (0, 2), (2, 2)] {
+                        let x = (2 * i + di) % prev.width;
+                        let y = (2 * j + dj) % prev.height;
+                        let e = prev.entries[y * prev.width + x];
+                        lo = lo.min(e as u16);
+                        hi = hi.max((e >> 16) as u16);
+                    }
+                }
+                entries[j * lw + i] = lo as u32 | (hi as u32) << 16;
+            }
+        }
+        levels.push(TmpLevel { shift, width: lw, height: lh, entries });
+        if lw == 1 && lh == 1 {
+            return levels;
+        }
+        shift += 1;
+    }
 }
 
 /// A displacement map as the kernels see it.
@@ -94,6 +163,7 @@ pub(crate) struct Grid<'m> {
     wrap: Wrap,
     /// Texels across and up.
     size: [f32; 2],
+    levels: &'m [TmpLevel],
 }
 
 impl<'m> Grid<'m> {
@@ -104,6 +174,108 @@ impl<'m> Grid<'m> {
             stride: map.stride(),
             wrap: map.wrap(),
             size: [width as f32, height as f32],
+            levels: &[],
+        }
+    }
+
+    pub fn with_levels(self, levels: &'m [TmpLevel]) -> Self {
+        Self { levels, ..self }
+    }
+
+    /// The stored value that means height 1.
+    pub fn unit(&self) -> f32 {
+        self.texels.unit()
+    }
+
+    /// Whole texel coordinates within one period of the map, or near it where it goes on for ever.
+    #[inline(always)]
+    pub fn base(&self, base: [f64; 2]) -> [f32; 2] {
+        std::array::from_fn(|axis| {
+            let n = f64::from(self.size[axis]);
+            let periodic = |n: f64| base[axis] - n * (base[axis] / n).floor();
+            let folded = match self.wrap {
+                Wrap::Repeat => periodic(n),
+                Wrap::Mirror => periodic(2.0 * n),
+                Wrap::Clamp => base[axis].clamp(-4.0 * n, 4.0 * n),
+            };
+            folded as f32
+        })
+    }
+
+    /// The finest level of the pyramid whose blocks are at least `size` texels wide.
+    #[inline(always)]
+    pub fn level(&self, size: f32) -> usize {
+        // Blocks of level l are 4 << l wide.
+        let bits = 32 - (size as u32).leading_zeros() as usize;
+        bits.saturating_sub(2).min(self.levels.len().saturating_sub(1))
+    }
+
+    /// Smallest and largest stored texel around boxes of texel coordinates ([low, high] in x and in y) no larger than a
+    /// block of the level.
+    #[inline(always)]
+    pub fn block_range<L: Lanes>(&self, level: usize, x: [L; 2], y: [L; 2]) -> [L; 2] {
+        let Some(level) = self.levels.get(level) else {
+            return [L::splat(0.0), L::splat(self.unit())];
+        };
+        let per_block = L::splat(1.0 / (1u32 << level.shift) as f32);
+        let i = (self.first(x, self.size[0]) * per_block).floor();
+        let j = (self.first(y, self.size[1]) * per_block).floor();
+        L::block_ranges(level, i, j)
+    }
+
+    /// The smallest folded coordinate of a box, or one in the same block.
+    #[inline(always)]
+    fn first<L: Lanes>(&self, [low, high]: [L; 2], n: f32) -> L {
+        let low = self.fold(low, n);
+        match self.wrap {
+            // Of a box that is folded back on itself the fold is within a block of the border.
+            Wrap::Mirror => low.min(self.fold(high, n)),
+            Wrap::Repeat | Wrap::Clamp => low,
+        }
+    }
+
+    /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), whole numbers within a few periods of
+    /// the map, as the wrap mode continues it.
+    #[inline(always)]
+    pub fn corners<L: Lanes>(&self, i: L, j: L) -> [L; 4] {
+        let (i, mirrored_x, flat_x) = self.fold_cell(i, self.size[0]);
+        let (j, mirrored_y, flat_y) = self.fold_cell(j, self.size[1]);
+        let corners = L::cell_corners(self, i, j);
+        if self.wrap == Wrap::Repeat {
+            return corners;
+        }
+        let [h00, h10, h01, h11] = corners;
+        // Before the first texel there is only the first: both corners are its.
+        let h10 = flat_x.select_negative(h00, h10);
+        let h11 = flat_x.select_negative(h01, h11);
+        let h01 = flat_y.select_negative(h00, h01);
+        let h11 = flat_y.select_negative(h10, h11);
+        let ((h00, h10), (h01, h11)) = (
+            swapped(mirrored_x, h00, h10),
+            swapped(mirrored_x, h01, h11),
+        );
+        let ((h00, h01), (h10, h11)) = (
+            swapped(mirrored_y, h00, h01),
+            swapped(mirrored_y, h10, h11),
+        );
+        [h00, h10, h01, h11]
+    }
+
+    /// A cell along a side of n texels: the stored cell, and, as sign bits, whether it runs backwards and whether it lies
+    /// before the first texel.
+    #[inline(always)]
+    fn fold_cell<L: Lanes>(&self, i: L, n: f32) -> (L, L, L) {
+        let (zero, one, size) = (L::splat(0.0), L::splat(1.0), L::splat(n));
+        match self.wrap {
+            Wrap::Repeat => (periodic(i, size), zero, zero),
+            Wrap::Clamp => (i.max(zero).min(size - one), zero, i),
+            Wrap::Mirror => {
+                let i = periodic(i, size + size);
+                // Cells n .. 2n-1 run backwards; the last one lies between the first texel and itself.
+                let backward = size - one - i;
+                let cell = backward.select_negative(size + size - one - one - i, i);
+                (cell.max(zero), backward, cell)
+            }
         }
     }
 
@@ -140,6 +312,20 @@ impl<'m> Grid<'m> {
             }
         }
     }
+}
+
+/// `(b, a)` where the sign bit is set, `(a, b)` elsewhere.
+#[inline(always)]
+fn swapped<L: Lanes>(sign: L, a: L, b: L) -> (L, L) {
+    (sign.select_negative(b, a), sign.select_negative(a, b))
+}
+
+/// i modulo n, for whole numbers below 2^24: all is exact but the quotient, which may be one off.
+#[inline(always)]
+fn periodic<L: Lanes>(i: L, n: L) -> L {
+    let i = i - n * (i / n).floor();
+    let i = i.select_negative(i + n, i);
+    (i - n).select_negative(i, i - n)
 }
 
 #[cfg(test)]
@@ -219,6 +405,15 @@ mod tests {
         assert_eq!(x.max_lane(), 9.0);
         assert_eq!(x.next().next().next().next().max_lane(), 8.0);
         assert_eq!(x.sign_mask(), 0b0001_0010);
+        assert_eq!(
+            x.next_of(L::splat(0.5)).to_array(),
+            [-2.0, 3.0, 9.0, -5.0, 6.0, 7.0, 8.0, 0.5]
+        );
+        assert_eq!(x.abs().to_array(), x.to_array().map(f32::abs));
+        let chosen = x.select_negative(L::splat(0.0), x);
+        assert_eq!(chosen.to_array(), x.to_array().map(|x| x.max(0.0)));
+        let bits = x.to_array().map(|x| AtomicU32::new(x.to_bits()));
+        assert_eq!(L::from_bits(&bits).to_array(), x.to_array());
     }
 
     #[test]

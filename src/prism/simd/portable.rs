@@ -1,6 +1,7 @@
 //! Eight lanes as two of glam's four: SSE2, NEON or plain Rust, whatever the architecture always has.
 
 use std::ops::{Add, Div, Mul, Sub};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec4;
 
@@ -28,6 +29,8 @@ lanewise!(Mul, mul);
 lanewise!(Div, div);
 
 impl Lanes for Portable {
+    type Quad = super::quad::PortableQuad;
+
     #[inline(always)]
     fn splat(x: f32) -> Self {
         Self(Vec4::splat(x), Vec4::splat(x))
@@ -44,6 +47,13 @@ impl Lanes for Portable {
         self.0.write_to_slice(&mut out[..4]);
         self.1.write_to_slice(&mut out[4..]);
         out
+    }
+
+    #[inline(always)]
+    fn from_bits(bits: &[AtomicU32; LANES]) -> Self {
+        Self::from_array(std::array::from_fn(|l| {
+            f32::from_bits(bits[l].load(Ordering::Relaxed))
+        }))
     }
 
     #[inline(always)]
@@ -72,6 +82,23 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+
+    #[inline(always)]
+    fn select_negative(self, a: Self, b: Self) -> Self {
+        let four = |sign: Vec4, a, b| Vec4::select(sign.signum().cmplt(Vec4::ZERO), a, b);
+        Self(four(self.0, a.0, b.0), four(self.1, a.1, b.1))
+    }
+
+    #[inline(always)]
+    fn next_of(self, rest: Self) -> Self {
+        let moved = self.next();
+        Self(moved.0, moved.1.with_w(rest.0.x))
+    }
+
+    #[inline(always)]
     fn next(self) -> Self {
         let (a, b) = (self.0, self.1);
         Self(Vec4::new(a.y, a.z, a.w, b.x), Vec4::new(b.y, b.z, b.w, b.w))
@@ -85,6 +112,20 @@ impl Lanes for Portable {
     #[inline(always)]
     fn sign_mask(self) -> u32 {
         self.0.is_negative_bitmask() | self.1.is_negative_bitmask() << 4
+    }
+
+    #[inline(always)]
+    fn block_ranges(level: &super::TmpLevel, i: Self, j: Self) -> [Self; 2] {
+        let (i, j) = (i.to_array(), j.to_array());
+        let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            let i = (i[l] as usize).min(level.width - 1);
+            let j = (j[l] as usize).min(level.height - 1);
+            let e = level.entries[j * level.width + i];
+            low[l] = (e & 0xffff) as f32;
+            high[l] = (e >> 16) as f32;
+        }
+        [Self::from_array(low), Self::from_array(high)]
     }
 
     #[inline(always)]

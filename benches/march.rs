@@ -1,4 +1,4 @@
-//! Rays per second of the uniform march under Embree: `cargo bench --bench uniform`.
+//! Rays per second of the marches under Embree: `cargo bench --bench march`.
 //!
 //! 1280 base triangles on a unit sphere, a 4096x4096 16-bit map of rock, range 0 .. 0.15, 1024x1024 primary rays.
 //! Options after `--`: `--map TEXELS`, `--size PIXELS`, `--rounds N`. Prints a Markdown table.
@@ -9,14 +9,14 @@ mod common;
 use std::sync::Arc;
 
 use common::rays::Rays;
-use common::scene::{prisms, rock_map, sphere};
+use common::scene::{prisms, rock_map, sphere, uniform};
 use common::timing::{RayTimes, option};
 use prismarch::embree::{EmbreeOptions, EmbreeTracer};
-use prismarch::prism::SimdLevel;
+use prismarch::prism::{March, SimdLevel};
 use prismarch::trace::{Object, Placement, Shape, World};
 
 struct Contestant {
-    texels: f32,
+    march: March,
     simd: SimdLevel,
     tracer: EmbreeTracer,
     rays: Rays,
@@ -33,9 +33,13 @@ fn main() {
     let mesh = sphere(3);
 
     let mut contestants = Vec::new();
-    for texels in [1.0, 4.0] {
-        for simd in [SimdLevel::Baseline, SimdLevel::Avx2] {
-            let Some(prisms) = prisms(&mesh, &map, texels).with_simd(simd) else {
+    let marches = [March::Exact, uniform(1.0), uniform(4.0)];
+    for march in marches.into_iter().take(option("--marches", 3)) {
+        for simd in [SimdLevel::Avx2, SimdLevel::Baseline]
+            .into_iter()
+            .take(option("--levels", 2))
+        {
+            let Some(prisms) = prisms(&mesh, &map, march).with_simd(simd) else {
                 continue;
             };
             let world = World::new(vec![Object {
@@ -46,7 +50,7 @@ fn main() {
             let tracer = EmbreeTracer::new(&world, &EmbreeOptions::default())
                 .expect("Embree builds the sphere");
             contestants.push(Contestant {
-                texels,
+                march,
                 simd,
                 rays: Rays::new(size, &tracer),
                 tracer,
@@ -62,16 +66,23 @@ fn main() {
         }
     }
 
-    println!("| step | kernel | threads | primary | bounce | occlusion |");
+    println!("| march | kernel | threads | primary | bounce | occlusion |");
     println!("| --- | --- | --- | --- | --- | --- |");
     for contestant in &contestants {
         for (times, threads) in contestant.times.iter().zip(THREADS) {
             println!(
-                "| {} texels | {:?} | {threads} | {} |",
-                contestant.texels,
-                contestant.simd,
+                "| {} | {} | {threads} | {} |",
+                name(contestant.march),
+                contestant.simd.name(),
                 times.cells(&contestant.rays),
             );
         }
+    }
+}
+
+fn name(march: March) -> String {
+    match march {
+        March::Exact => "exact".to_owned(),
+        March::Uniform { step, .. } => format!("uniform, {step:?}"),
     }
 }

@@ -1,0 +1,239 @@
+//! Eight prisms side by side: what a backend traces as one primitive.
+//!
+//! A ray is tested against all eight in one set of lanes ([`cull`](super::cull)), so that a backend's tree has an eighth of the leaves
+//! and makes a fraction of the calls. 27 floats hold a prism: corners (9), vertex normals (9), texture coordinates after
+//! the UV transform (6), the range of w = D/|N'| (2), and the base triangle's number with its flags (1): 108 bytes per base
+//! triangle.
+//!
+//! Corners, normals and texture coordinates are the mesh's own digits: what two prisms share, they share bit for bit.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use glam::{DVec2, DVec3};
+
+use super::simd::{LANES, Lanes};
+use crate::surface::{DisplacedSurface, DisplacementMap, Patch};
+
+/// Up to eight prisms; lanes that are not used repeat the first.
+#[repr(C, align(32))]
+pub struct Cluster {
+    /// By corner and axis.
+    vertices: [[[f32; LANES]; 3]; 3],
+    normals: [[[f32; LANES]; 3]; 3],
+    texcoords: [[[f32; LANES]; 2]; 3],
+    /// Bits of the smallest and the largest w: an edit of the map changes them in place.
+    offsets: [[AtomicU32; LANES]; 2],
+    prims: [u32; LANES],
+}
+
+const _: () = assert!(size_of::<Cluster>() == 108 * LANES);
+
+/// In [`Cluster::prims`]: t is not monotone in w.
+const FOLDED: u32 = 1 << 31;
+
+/// Base triangles that can be numbered.
+pub const MOST_PRISMS: usize = 1 << 31;
+
+/// What the set-up needs of one prism.
+pub struct Member<'m> {
+    pub patch: Patch<'m>,
+    pub offsets: [f64; 2],
+    pub prim: u32,
+    pub folded: bool,
+}
+
+impl Cluster {
+    /// The prisms over these base triangles (one to eight); `offsets` gives the range of w of each.
+    pub fn new(
+        surface: &DisplacedSurface,
+        prims: &[u32],
+        offsets: impl Fn(u32) -> [f32; 2],
+    ) -> Self {
+        debug_assert!((1..=LANES).contains(&prims.len()));
+        let of_lane = |l: usize| prims.get(l).copied().unwrap_or(prims[0]);
+        let mesh = surface.mesh();
+        let mut cluster = Self {
+            vertices: [[[0.0; LANES]; 3]; 3],
+            normals: [[[0.0; LANES]; 3]; 3],
+            texcoords: [[[0.0; LANES]; 2]; 3],
+            offsets: Default::default(),
+            prims: std::array::from_fn(of_lane),
+        };
+        for l in 0..LANES {
+            let prim = of_lane(l);
+            let (v, n) = (mesh.corners(prim), mesh.corner_normals(prim));
+            let st = surface.corner_texcoords(prim);
+            for k in 0..3 {
+                for axis in 0..3 {
+                    cluster.vertices[k][axis][l] = v[k][axis];
+                    cluster.normals[k][axis][l] = n[k][axis];
+                }
+                for axis in 0..2 {
+                    cluster.texcoords[k][axis][l] = st[k][axis];
+                }
+            }
+            let range = offsets(prim);
+            for (end, w) in range.into_iter().enumerate() {
+                cluster.offsets[end][l] = AtomicU32::new(w.to_bits());
+            }
+            if is_folded(&surface.patch(prim), range.map(f64::from)) {
+                cluster.prims[l] |= FOLDED;
+            }
+        }
+        cluster
+    }
+
+    /// Base triangle of a lane.
+    #[inline(always)]
+    pub fn prim(&self, lane: usize) -> u32 {
+        self.prims[lane] & !FOLDED
+    }
+
+    /// The range of w of a lane.
+    #[inline(always)]
+    pub fn offsets(&self, lane: usize) -> [f32; 2] {
+        [0, 1].map(|end: usize| f32::from_bits(self.offsets[end][lane].load(Ordering::Relaxed)))
+    }
+
+    /// Corners by axis, in the order of `axes`; all lanes.
+    #[inline(always)]
+    pub fn lanes<L: Lanes>(&self, axes: [usize; 3]) -> ([[L; 3]; 3], [[L; 3]; 3], [L; 2]) {
+        let ([v0, v1, v2], [n0, n1, n2]) = (&self.vertices, &self.normals);
+        (
+            [by_axes(v0, axes), by_axes(v1, axes), by_axes(v2, axes)],
+            [by_axes(n0, axes), by_axes(n1, axes), by_axes(n2, axes)],
+            [
+                L::from_bits(&self.offsets[0]),
+                L::from_bits(&self.offsets[1]),
+            ],
+        )
+    }
+
+    /// One prism in all lanes.
+    #[inline(always)]
+    pub fn splat<L: Lanes>(
+        &self,
+        lane: usize,
+        axes: [usize; 3],
+    ) -> ([[L; 3]; 3], [[L; 3]; 3], [L; 2]) {
+        let by_axes = |rows: &[[[f32; LANES]; 3]; 3]| {
+            [0, 1, 2].map(|k: usize| axes.map(|axis| L::splat(rows[k][axis][lane])))
+        };
+        (
+            by_axes(&self.vertices),
+            by_axes(&self.normals),
+            self.offsets(lane).map(L::splat),
+        )
+    }
+
+    /// One prism in f64. Texel coordinates are not moved by periods of the map: neighbours have the same.
+    #[inline(always)]
+    pub fn member<'m>(
+        &self,
+        lane: usize,
+        map: &'m DisplacementMap,
+        scale: f64,
+        midlevel: f64,
+    ) -> Member<'m> {
+        let vector = |rows: &[[f32; LANES]; 3]| {
+            DVec3::new(rows[0][lane].into(), rows[1][lane].into(), rows[2][lane].into())
+        };
+        let texel = |rows: &[[f32; LANES]; 2]| {
+            map.to_texel(DVec2::new(rows[0][lane].into(), rows[1][lane].into()))
+        };
+        let [v0, v1, v2] = &self.vertices;
+        let [n0, n1, n2] = &self.normals;
+        let [s0, s1, s2] = &self.texcoords;
+        Member {
+            patch: Patch {
+                vertices: [vector(v0), vector(v1), vector(v2)],
+                normals: [vector(n0), vector(n1), vector(n2)],
+                texels: [texel(s0), texel(s1), texel(s2)],
+                map,
+                scale,
+                midlevel,
+            },
+            offsets: self.offsets(lane).map(f64::from),
+            prim: self.prim(lane),
+            folded: self.prims[lane] & FOLDED != 0,
+        }
+    }
+}
+
+#[inline(always)]
+fn by_axes<L: Lanes>(rows: &[[f32; LANES]; 3], [x, y, z]: [usize; 3]) -> [L; 3] {
+    [
+        L::from_array(rows[x]),
+        L::from_array(rows[y]),
+        L::from_array(rows[z]),
+    ]
+}
+
+/// Whether t is monotone in w on every ray through the prism: N'(b) . m(w) > 0, m the area normal of the triangle at w. It
+/// is linear in b, so the corners decide; each is a quadratic in w, whose Bernstein coefficients bound it from below.
+fn is_folded(patch: &Patch<'_>, [low, high]: [f64; 2]) -> bool {
+    let [v0, v1, v2] = patch.vertices;
+    let [n0, n1, n2] = patch.normals;
+    let edges = |w: f64| (v1 - v0 + w * (n1 - n0), v2 - v0 + w * (n2 - n0));
+    let ((a0, b0), (a1, b1)) = (edges(low), edges(high));
+    let (first, last) = (a0.cross(b0), a1.cross(b1));
+    let middle = 0.5 * (a0.cross(b1) + a1.cross(b0));
+    let least = patch
+        .normals
+        .iter()
+        .flat_map(|n| [first, middle, last].map(|m| n.dot(m)))
+        .fold(f64::INFINITY, f64::min);
+    let most = first.length().max(last.length());
+    const MARGIN: f64 = 1e-9;
+    least <= MARGIN * most
+}
+
+/// The base triangles in groups of [`LANES`] that lie near one another; only the last group may be smaller.
+///
+/// Median cuts along the longest side of the centroids' box, at multiples of the group's size.
+pub fn groups(centroids: &[DVec3]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..centroids.len() as u32).collect();
+    let mut waiting = vec![0..order.len()];
+    while let Some(range) = waiting.pop() {
+        if range.len() <= LANES {
+            order[range].sort_unstable();
+            continue;
+        }
+        let part = &mut order[range.clone()];
+        let (low, high) = part.iter().fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(low, high), &prim| {
+                let p = centroids[prim as usize];
+                (low.min(p), high.max(p))
+            },
+        );
+        let axis = (high - low).max_position();
+        let half = part.len().div_ceil(2).next_multiple_of(LANES);
+        let key = |prim: u32| (centroids[prim as usize][axis], prim);
+        part.select_nth_unstable_by(half, |&a, &b| {
+            let ((x, i), (y, j)) = (key(a), key(b));
+            x.total_cmp(&y).then(i.cmp(&j))
+        });
+        waiting.push(range.start..range.start + half);
+        waiting.push(range.start + half..range.end);
+    }
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_full_compact_and_hold_every_triangle_once() {
+        for count in [1, 7, 8, 9, 16, 17, 100, 1280] {
+            let centroids: Vec<DVec3> = (0..count)
+                .map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100)))
+                .collect();
+            let order = groups(&centroids);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert!(sorted.iter().copied().eq(0..count as u32));
+        }
+    }
+}

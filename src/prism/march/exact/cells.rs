@@ -1,0 +1,200 @@
+//! The texel cells under a short chord of the curve, one lane each, solved in closed form.
+//!
+//! Along a chord (x, y, h) is linear, and in one cell the surface is bilinear in (x, y): f = h - D is a quadratic in the
+//! chord's parameter. Lane 0 is the cell in which the chord starts; every other lane is the cell entered by one crossing of a
+//! texel line, in no order: it leaves at the next line. A lane in which |f| provably stays above what the chord may be
+//! off is done with; the others are reported in order, with both ends and the turning point between.
+
+use super::signs::Signs;
+use crate::prism::curve::Curve;
+use crate::prism::simd::{Grid, LANES, Lanes};
+
+/// Most cells of a chord: one lane each.
+pub const MOST_CELLS: i32 = LANES as i32;
+
+/// A chord that is this close to a texel line, in texels, has crossed it: so that a corner between two lanes, each off by a
+/// rounding, is in both rather than in none.
+pub const NUDGE: f32 = 1.0 / 8192.0;
+
+/// A straight piece of the curve over at most [`MOST_CELLS`] cells.
+pub struct Chord {
+    /// (x, y, h) at both ends; x, y relative to the curve's base, h in stored texel units.
+    pub from: [f32; 3],
+    pub to: [f32; 3],
+    /// The curve's parameter there.
+    pub s: [f32; 2],
+    /// How far f may be off, stored texel units.
+    pub off: f32,
+    /// Whether crossings here may be outside the ray's interval.
+    pub cut: bool,
+}
+
+/// The lanes' quadratics.
+struct Lane {
+    /// The chord's parameter where the lane begins, and how far it goes.
+    start: [f32; LANES],
+    length: [f32; LANES],
+    /// f over the lane's own parameter in [0, 1].
+    f: [[f32; LANES]; 3],
+}
+
+impl Chord {
+    /// Reports the cells that may be crossed.
+    #[inline(always)]
+    pub fn walk<L: Lanes>(
+        &self,
+        grid: &Grid<'_>,
+        base: [f32; 2],
+        curve: &Curve<L::Quad>,
+        signs: &mut Signs<'_>,
+    ) {
+        let [x0, y0, h0] = self.from;
+        let [x1, y1, h1] = self.to;
+        let (i0, j0) = (x0.floor(), y0.floor());
+        let (nx, ny) = ((x1.floor() - i0).abs(), (y1.floor() - j0).abs());
+        let (dx, dy, dh) = (x1 - x0, y1 - y0, h1 - h0);
+        // Positions relative to the first cell: few digits before the point.
+        let (x0, y0) = (x0 - i0, y0 - j0);
+        let inverse = |d: f32| 1.0 / if d.abs() < 1e-12 { 1e-12f32.copysign(d) } else { d };
+        let (per_x, per_y) = (inverse(dx), inverse(dy));
+        let (step_x, step_y) = (1f32.copysign(dx), 1f32.copysign(dy));
+        // The line of its cell through which the chord leaves: the right and upper one, or the left and lower one.
+        let (ahead_x, ahead_y) = (step_x.max(0.0), step_y.max(0.0));
+
+        let zero = L::splat(0.0);
+        let one = L::splat(1.0);
+        let numbers = L::from_array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        // Lanes 1 to nx: crossings of x lines; then ny crossings of y lines.
+        let line_x = numbers.mul_add(L::splat(step_x), L::splat(ahead_x - step_x));
+        let line_y = (numbers - L::splat(nx)).mul_add(L::splat(step_y), L::splat(ahead_y - step_y));
+        let by_x = (line_x - L::splat(x0)) * L::splat(per_x);
+        let by_y = (line_y - L::splat(y0)) * L::splat(per_y);
+        let at_x_line = numbers - L::splat(nx + 0.5);
+        let begins = at_x_line.select_negative(by_x, by_y);
+        let start = (numbers - L::splat(0.5)).select_negative(zero, begins);
+
+        let x = start.mul_add(L::splat(dx), L::splat(x0));
+        let y = start.mul_add(L::splat(dy), L::splat(y0));
+        let i = (x + L::splat(step_x * NUDGE)).floor();
+        let j = (y + L::splat(step_y * NUDGE)).floor();
+        let leaves_x = (i + L::splat(ahead_x) - L::splat(x0)) * L::splat(per_x);
+        let leaves_y = (j + L::splat(ahead_y) - L::splat(y0)) * L::splat(per_y);
+        let end = leaves_x.min(leaves_y).min(one);
+        let length = (end - start).max(zero);
+
+        let [h00, h10, h01, h11] =
+            grid.corners(i + L::splat(i0 + base[0]), j + L::splat(j0 + base[1]));
+        let (bottom, left) = (h10 - h00, h01 - h00);
+        let twist = (h11 - h01) - bottom;
+        let (fx, fy) = (x - i, y - j);
+        let slope_x = twist.mul_add(fy, bottom);
+        let slope_y = twist.mul_add(fx, left);
+        let surface = fy.mul_add(left, fx.mul_add(slope_x, h00));
+        let f0 = start.mul_add(L::splat(dh), L::splat(h0)) - surface;
+        let (mx, my) = (length * L::splat(dx), length * L::splat(dy));
+        let f1 = length * L::splat(dh) - slope_x * mx - slope_y * my;
+        let f2 = zero - twist * mx * my;
+
+        // With the sign at the start made positive: can f come within `off` of 0?
+        let g0 = f0.abs() - L::splat(self.off);
+        let g1 = f0.select_negative(zero - f1, f1);
+        let g2 = f0.select_negative(zero - f2, f2);
+        let at_end = g0 + g1 + g2;
+        let discriminant = g1 * g1 - L::splat(4.0) * g0 * g2;
+        let crosses = g0.sign_mask() | at_end.sign_mask();
+        // The parabola turns between the ends, upward, and has a root.
+        let turns = g1.sign_mask()
+            & !(g1 + g2 + g2).sign_mask()
+            & !discriminant.sign_mask();
+        let used = (1u32 << (nx + ny + 1.0) as u32) - 1;
+        let possible = (crosses | turns) & used;
+        if possible == 0 {
+            return;
+        }
+        let lanes = Lane {
+            start: start.to_array(),
+            length: length.to_array(),
+            f: [f0.to_array(), f1.to_array(), f2.to_array()],
+        };
+        self.report(possible, &lanes, curve, signs);
+    }
+
+    #[inline(always)]
+    fn report<Q: crate::prism::simd::Quad>(
+        &self,
+        mut possible: u32,
+        lanes: &Lane,
+        curve: &Curve<Q>,
+        signs: &mut Signs<'_>,
+    ) {
+        let [s0, s1] = self.s.map(f64::from);
+        let s = |tau: f32| s0 + f64::from(tau).clamp(0.0, 1.0) * (s1 - s0);
+        while possible != 0 {
+            let lane = first(possible, &lanes.start);
+            possible &= !(1 << lane);
+            let (start, length) = (lanes.start[lane], lanes.length[lane]);
+            let [f0, f1, f2] = lanes.f.map(|f| f[lane]);
+            let end = f0 + f1 + f2;
+            let known = |f: f32| (f.abs() > self.off).then_some(f > 0.0);
+            let (before, after) = (known(f0), known(end));
+            let certain = !self.cut && before.is_some() && after.is_some();
+            signs.point(curve, s(start), before, s(start), false);
+            if signs.is_done() {
+                return;
+            }
+            let turn = -f1 / (2.0 * f2);
+            if turn > 0.0 && turn < 1.0 && !(certain && before != after) {
+                let at = f0 + turn * (f1 + turn * f2);
+                let root = start + length * first_root(f0, f1, f2);
+                signs.point(curve, s(start + turn * length), known(at), s(root), false);
+                if signs.is_done() {
+                    return;
+                }
+            }
+            let root = start + length * last_root(f0, f1, f2);
+            signs.point(curve, s(start + length), after, s(root), certain);
+            if signs.is_done() {
+                return;
+            }
+        }
+    }
+}
+
+/// The lane among `possible` that begins first.
+#[inline(always)]
+fn first(possible: u32, start: &[f32; LANES]) -> usize {
+    let mut best = possible.trailing_zeros() as usize;
+    let mut rest = possible & (possible - 1);
+    while rest != 0 {
+        let lane = rest.trailing_zeros() as usize;
+        rest &= rest - 1;
+        if start[lane] < start[best] {
+            best = lane;
+        }
+    }
+    best
+}
+
+/// The root before the turning point of f0 + f1 r + f2 r^2, about.
+#[inline(always)]
+fn first_root(f0: f32, f1: f32, f2: f32) -> f32 {
+    let root = (f1 * f1 - 4.0 * f0 * f2).max(0.0).sqrt();
+    // The stable form for a root on the way from f0 toward 0.
+    2.0 * f0 / (root.copysign(f0) - f1)
+}
+
+/// The root in (0, 1] next to the end, about.
+#[inline(always)]
+fn last_root(f0: f32, f1: f32, f2: f32) -> f32 {
+    let root = (f1 * f1 - 4.0 * f0 * f2).max(0.0).sqrt();
+    let q = -0.5 * (f1 + root.copysign(f1));
+    let (a, b) = (q / f2, f0 / q);
+    let within = |r: f32| (0.0..=1.0).contains(&r);
+    if within(a) && within(b) {
+        a.max(b)
+    } else if within(a) {
+        a
+    } else {
+        b
+    }
+}
