@@ -92,7 +92,11 @@ impl Cluster {
     /// The range of w of a lane.
     #[inline(always)]
     pub fn offsets(&self, lane: usize) -> [f32; 2] {
-        [0, 1].map(|end: usize| f32::from_bits(self.offsets[end][lane].load(Ordering::Relaxed)))
+        let [low, high] = &self.offsets;
+        [
+            f32::from_bits(low[lane].load(Ordering::Relaxed)),
+            f32::from_bits(high[lane].load(Ordering::Relaxed)),
+        ]
     }
 
     /// Corners by axis, in the order of `axes`; all lanes.
@@ -141,6 +145,7 @@ impl Cluster {
         let texel = |rows: &[[f32; LANES]; 2]| {
             map.to_texel(DVec2::new(rows[0][lane].into(), rows[1][lane].into()))
         };
+        let [low, high] = self.offsets(lane);
         let [v0, v1, v2] = &self.vertices;
         let [n0, n1, n2] = &self.normals;
         let [s0, s1, s2] = &self.texcoords;
@@ -153,7 +158,7 @@ impl Cluster {
                 scale,
                 midlevel,
             },
-            offsets: self.offsets(lane).map(f64::from),
+            offsets: [f64::from(low), f64::from(high)],
             prim: self.prim(lane),
             folded: self.prims[lane] & FOLDED != 0,
         }

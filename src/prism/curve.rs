@@ -61,6 +61,7 @@ pub struct Stretches {
 }
 
 impl Stretches {
+    #[inline(always)]
     fn new() -> Self {
         let none = Stretch {
             w: [0.0; 2],
@@ -73,6 +74,7 @@ impl Stretches {
         }
     }
 
+    #[inline(always)]
     fn push(&mut self, stretch: Stretch) {
         if stretch.w[0] < stretch.w[1] && self.count < self.all.len() {
             self.all[self.count] = stretch;

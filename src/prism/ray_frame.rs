@@ -37,12 +37,11 @@ impl RayFrame {
         } else {
             [1, 2, 0]
         };
-        let along = |v: DVec3| axes.map(|axis| v[axis]);
-        let direction = along(ray.direction.as_dvec3());
+        let direction = along(ray.direction.as_dvec3(), axes);
         let per_depth = 1.0 / direction[2];
         Self {
             axes,
-            origin: along(ray.origin.as_dvec3()),
+            origin: along(ray.origin.as_dvec3(), axes),
             shear: [direction[0] * per_depth, direction[1] * per_depth],
             per_depth,
             interval: [ray.tnear, ray.tfar],
@@ -88,4 +87,9 @@ impl RayFrame {
         }
         (self.per_depth as f32, self.interval)
     }
+}
+
+#[inline(always)]
+fn along(v: DVec3, [x, y, z]: [usize; 3]) -> [f64; 3] {
+    [v[x], v[y], v[z]]
 }

@@ -101,7 +101,7 @@ impl Texels {
     }
 
     /// Texel `index` as stored.
-    #[inline]
+    #[inline(always)]
     fn raw(&self, index: usize) -> f32 {
         match self {
             Self::U8(t) => f32::from(t[index]),
@@ -223,6 +223,7 @@ impl DisplacementMap {
     }
 
     /// Height and in-cell gradient at texel coordinates.
+    #[inline(always)]
     pub fn sample(&self, p: DVec2) -> HeightSample {
         let (i, fx, sx) = self.cell(p.x, self.width);
         let (j, fy, sy) = self.cell(p.y, self.height);
@@ -249,13 +250,13 @@ impl DisplacementMap {
     }
 
     /// Stored texel of column `i` in 0..=width and row `j` in 0..=height.
-    #[inline]
+    #[inline(always)]
     fn raw(&self, i: usize, j: usize) -> f32 {
         self.texels.raw(j * self.stride() + i)
     }
 
     /// The cell of coordinate `x` along a side of `n` texels, the position in it, and how fast it moves with x.
-    #[inline]
+    #[inline(always)]
     fn cell(&self, x: f64, n: usize) -> (usize, f64, f64) {
         let (folded, slope) = self.wrap.fold(x, n as f64);
         let i = (folded.floor() as usize).min(n - 1);

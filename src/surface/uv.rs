@@ -18,7 +18,7 @@ pub enum Wrap {
 impl Wrap {
     /// Folds texel coordinate `x` (texel centres at the integers) of a side of `n` texels into the stored map:
     /// [0, n) for repeat, [0, n-1] else; and the derivative of the folded coordinate, 1, -1 or 0.
-    #[inline]
+    #[inline(always)]
     pub fn fold(self, x: f64, n: f64) -> (f64, f64) {
         match self {
             Self::Repeat => ((x - n * (x / n).floor()).clamp(0.0, n), 1.0),
@@ -56,6 +56,7 @@ impl Wrap {
     }
 }
 
+#[inline(always)]
 fn clamp_to_centres(x: f64, slope: f64, n: f64) -> (f64, f64) {
     let clamped = x.clamp(0.0, n - 1.0);
     (clamped, if clamped == x { slope } else { 0.0 })

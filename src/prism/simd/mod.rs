@@ -167,6 +167,7 @@ pub(crate) struct Grid<'m> {
 }
 
 impl<'m> Grid<'m> {
+    #[inline(always)]
     pub fn new(map: &'m DisplacementMap) -> Self {
         let (width, height) = map.size();
         Self {
@@ -178,11 +179,13 @@ impl<'m> Grid<'m> {
         }
     }
 
+    #[inline(always)]
     pub fn with_levels(self, levels: &'m [TmpLevel]) -> Self {
         Self { levels, ..self }
     }
 
     /// The stored value that means height 1.
+    #[inline(always)]
     pub fn unit(&self) -> f32 {
         self.texels.unit()
     }
@@ -190,16 +193,18 @@ impl<'m> Grid<'m> {
     /// Whole texel coordinates within one period of the map, or near it where it goes on for ever.
     #[inline(always)]
     pub fn base(&self, base: [f64; 2]) -> [f32; 2] {
-        std::array::from_fn(|axis| {
-            let n = f64::from(self.size[axis]);
-            let periodic = |n: f64| base[axis] - n * (base[axis] / n).floor();
-            let folded = match self.wrap {
-                Wrap::Repeat => periodic(n),
-                Wrap::Mirror => periodic(2.0 * n),
-                Wrap::Clamp => base[axis].clamp(-4.0 * n, 4.0 * n),
-            };
-            folded as f32
-        })
+        [self.base_along(base[0], 0), self.base_along(base[1], 1)]
+    }
+
+    #[inline(always)]
+    fn base_along(&self, base: f64, axis: usize) -> f32 {
+        let n = f64::from(self.size[axis]);
+        let folded = match self.wrap {
+            Wrap::Repeat => base - n * (base / n).floor(),
+            Wrap::Mirror => base - 2.0 * n * (base / (2.0 * n)).floor(),
+            Wrap::Clamp => base.clamp(-4.0 * n, 4.0 * n),
+        };
+        folded as f32
     }
 
     /// The finest level of the pyramid whose blocks are at least `size` texels wide.

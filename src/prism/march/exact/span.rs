@@ -93,7 +93,8 @@ impl<'a, L: Lanes> Walker<'a, L> {
         let n = &patch.normals;
         let [t0, t1] = ends;
         let [w0, dw] = curve.w;
-        let [tnear, tfar] = problem.interval.map(f64::from);
+        let [tnear, tfar] = problem.interval;
+        let (tnear, tfar) = (f64::from(tnear), f64::from(tfar));
         let cut = problem.ordered && (t0 <= tnear || t1 >= tfar);
         let time = if cut {
             let z = |k: usize| depth[k][1];
@@ -107,12 +108,14 @@ impl<'a, L: Lanes> Walker<'a, L> {
         } else {
             [0.0; 4]
         };
-        let time: [f32; 4] = std::array::from_fn(|k| {
-            let area = if k < 3 { depth[k][0] } else { 0.0 };
-            (time[k] * curve.per_depth - t0 * area) as f32
-        });
-        let slack = (time.iter().map(|c| c.abs()).sum::<f32>() + (t1 - t0).abs() as f32)
-            * (8.0 * ROUNDING);
+        let time = [
+            (time[0] * curve.per_depth - t0 * depth[0][0]) as f32,
+            (time[1] * curve.per_depth - t0 * depth[1][0]) as f32,
+            (time[2] * curve.per_depth - t0 * depth[2][0]) as f32,
+            (time[3] * curve.per_depth) as f32,
+        ];
+        let magnitude = time[0].abs() + time[1].abs() + time[2].abs() + time[3].abs();
+        let slack = (magnitude + (t1 - t0).abs() as f32) * (8.0 * ROUNDING);
         let base = problem.grid.base(curve.texel_base);
         Self {
             problem,
@@ -122,7 +125,11 @@ impl<'a, L: Lanes> Walker<'a, L> {
                 narrow(&p1.to_array()),
                 narrow(&p2.to_array()),
             ],
-            area: depth.map(|c| c[0] as f32),
+            area: [
+                depth[0][0] as f32,
+                depth[1][0] as f32,
+                depth[2][0] as f32,
+            ],
             height: [(w0 * per_world) as f32, (dw * per_world) as f32],
             midlevel: (unit * patch.midlevel) as f32,
             spread: Vec3::new(
@@ -425,7 +432,7 @@ impl Span {
         let area = a0.abs() + a1.abs() + a2.abs();
         let rounding = (magnitude + largest * area) * (inverse * ROUNDING);
 
-        let [s01, s02, _] = walker.spread.to_array().map(f32::sqrt);
+        let (s01, s02) = (walker.spread.x.sqrt(), walker.spread.y.sqrt());
         let shortest = (1.0 - walker.spread.max_element() / 3.0).max(1e-6).sqrt();
         let turn = s01 * slope.z + s02 * slope.w;
         let turn_bend = s01 * bend.z + s02 * bend.w + turn * turn / (2.0 * shortest);
