@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Device -> SceneBuilder -- attach(UserGeometry | TriangleGeometry), attach_instance --> commit -> Scene
-//! Scene  -- intersect1, occluded1 from any thread;  Scene -- reopen --> SceneBuilder (edit, commit again)
+//! Scene  -- intersect1, occluded1, intersect8, occluded8 from any thread;  Scene -- reopen --> SceneBuilder (edit, commit again)
 //! ```
 //!
 //! Only a committed [`Scene`] can be traced and only an uncommitted [`SceneBuilder`] can be changed; the
@@ -32,7 +32,7 @@ pub use error::{EmbreeError, ErrorCode};
 pub use filter::HitFilter;
 pub use geometry::Geometry;
 pub use instance::{Instance, Prototype};
-pub use scene::{BuildQuality, Scene, SceneBuilder, SceneEdit, SceneOptions};
+pub use scene::{BuildQuality, Coherence, Scene, SceneBuilder, SceneEdit, SceneOptions};
 pub use tracer::{EmbreeOptions, EmbreeTracer};
 pub use triangles::TriangleGeometry;
 pub use user::{HitTest, UserGeometry};

@@ -3,10 +3,10 @@
 use glam::Affine3A;
 
 use super::{
-    BuildQuality, Device, DeviceOptions, EmbreeError, Geometry, Instance, Scene, SceneBuilder,
-    SceneOptions, TriangleGeometry, UserGeometry,
+    BuildQuality, Coherence, Device, DeviceOptions, EmbreeError, Geometry, Instance, Scene,
+    SceneBuilder, SceneOptions, TriangleGeometry, UserGeometry,
 };
-use crate::ray::{Aabb, Ray};
+use crate::ray::{Aabb, Ray, RayPacket};
 use crate::trace::{Hit, Object, Placement, Shape, Tracer, World};
 
 /// How Embree builds a world.
@@ -107,6 +107,14 @@ impl Tracer for EmbreeTracer {
 
     fn occluded(&self, ray: &Ray) -> bool {
         self.scene.occluded1(ray)
+    }
+
+    fn intersect8(&self, rays: &RayPacket) -> [Option<Hit>; RayPacket::LANES] {
+        self.scene.intersect8(rays, Coherence::Coherent)
+    }
+
+    fn occluded8(&self, rays: &RayPacket) -> u8 {
+        self.scene.occluded8(rays, Coherence::Coherent)
     }
 
     fn bounds(&self) -> Aabb {
