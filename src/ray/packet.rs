@@ -8,8 +8,8 @@ use super::Ray;
 
 /// Eight rays, one per lane, in arrays that a vector register loads whole.
 ///
-/// A lane whose ray is not [valid](Ray::is_valid) is empty: it hits nothing. What answers packets may be faster when
-/// the rays go the same way from about the same place, and never answers otherwise than for each ray alone.
+/// A lane whose ray is not [valid](Ray::is_valid) is empty: it hits nothing. Rays of a packet may be answered faster
+/// than each alone when they go the same way from about the same place; the answers are the same.
 // Word for word Embree's RTCRay8, so that packets pass through it as they are: `time` and `flags` are its own.
 #[repr(C, align(32))]
 #[derive(Clone, Debug)]
