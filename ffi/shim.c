@@ -45,6 +45,10 @@ _Static_assert((int)PM_SCENE_DYNAMIC == (int)RTC_SCENE_FLAG_DYNAMIC &&
                    (int)PM_SCENE_COMPACT == (int)RTC_SCENE_FLAG_COMPACT &&
                    (int)PM_SCENE_ROBUST == (int)RTC_SCENE_FLAG_ROBUST,
                "scene flags");
+_Static_assert(sizeof(pm_grid) == sizeof(struct RTCGrid) &&
+                   offsetof(pm_grid, stride) == offsetof(struct RTCGrid, stride) &&
+                   offsetof(pm_grid, height) == offsetof(struct RTCGrid, height),
+               "pm_grid must be RTCGrid");
 _Static_assert(PM_INVALID_ID == RTC_INVALID_GEOMETRY_ID, "invalid id");
 
 struct pm_device {
@@ -444,13 +448,27 @@ pm_geometry *pm_geometry_new_user(const pm_device *device, const pm_hit_test *te
   return g;
 }
 
+void pm_geometry_set_vertices(pm_geometry *g, const float *vertices, uint32_t vertex_count) {
+  rtcSetSharedGeometryBuffer(g->rtc, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0, 12, vertex_count);
+}
+
 pm_geometry *pm_geometry_new_triangles(const pm_device *device, const float *vertices, uint32_t vertex_count,
                                        const uint32_t *indices, uint32_t triangle_count) {
   pm_geometry *g = new_geometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   if (!g)
     return NULL;
-  rtcSetSharedGeometryBuffer(g->rtc, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0, 12, vertex_count);
+  pm_geometry_set_vertices(g, vertices, vertex_count);
   rtcSetSharedGeometryBuffer(g->rtc, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices, 0, 12, triangle_count);
+  return g;
+}
+
+pm_geometry *pm_geometry_new_grids(const pm_device *device, const float *vertices, uint32_t vertex_count,
+                                   const pm_grid *grids, uint32_t grid_count) {
+  pm_geometry *g = new_geometry(device, RTC_GEOMETRY_TYPE_GRID);
+  if (!g)
+    return NULL;
+  pm_geometry_set_vertices(g, vertices, vertex_count);
+  rtcSetSharedGeometryBuffer(g->rtc, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID, grids, 0, sizeof *grids, grid_count);
   return g;
 }
 

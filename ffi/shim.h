@@ -92,6 +92,12 @@ typedef struct pm_hit_test {
   uint32_t (*occluded8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid);
 } pm_hit_test;
 
+/* A regular grid of width x height vertices, `stride` vertices from one row to the next: word for word RTCGrid. */
+typedef struct pm_grid {
+  uint32_t first, stride;
+  uint16_t width, height;
+} pm_grid;
+
 /* Whether a candidate hit counts; ray->tfar is the candidate's t. A rejected one lets the ray go on. */
 typedef bool (*pm_filter)(const void *user, const pm_ray *ray, const pm_scene_hit *candidate);
 
@@ -126,12 +132,17 @@ pm_geometry *pm_geometry_new_user(const pm_device *device, const pm_hit_test *te
 /* Both arrays are shared, not copied: vertices as x y z with 4 readable bytes after the last one. */
 pm_geometry *pm_geometry_new_triangles(const pm_device *device, const float *vertices, uint32_t vertex_count,
                                        const uint32_t *indices, uint32_t triangle_count);
+/* The same for grids, whose cells are two triangles each. */
+pm_geometry *pm_geometry_new_grids(const pm_device *device, const float *vertices, uint32_t vertex_count,
+                                   const pm_grid *grids, uint32_t grid_count);
 /* `transform`: object to world, 4 columns of 3. */
 pm_geometry *pm_geometry_new_instance(const pm_device *device, pm_scene *scene, const float transform[12]);
 void pm_geometry_free(pm_geometry *geometry);
 
 /* Another test for a user geometry. */
 void pm_geometry_set_test(pm_geometry *geometry, const pm_hit_test *test, const void *user, uint32_t primitives);
+/* The vertices of triangles or grids have moved, perhaps to another array of the same length. */
+void pm_geometry_set_vertices(pm_geometry *geometry, const float *vertices, uint32_t vertex_count);
 void pm_geometry_set_mask(pm_geometry *geometry, uint32_t mask);
 /* Sets the intersection and the occlusion filter; not for instances. */
 void pm_geometry_set_filter(pm_geometry *geometry, pm_filter filter, const void *user);

@@ -81,16 +81,20 @@ fn texcoords(face: [Vec3; 3]) -> [Vec2; 3] {
     })
 }
 
-/// Prisms around `mesh` displaced by `map` with a range of 0 .. [`RANGE`].
-pub fn prisms(mesh: &Arc<BaseMesh>, map: &Arc<DisplacementMap>, texels: f32) -> Prisms {
+/// `mesh` displaced by `map` with a range of 0 .. [`RANGE`].
+pub fn displaced(mesh: &Arc<BaseMesh>, map: &Arc<DisplacementMap>) -> Arc<DisplacedSurface> {
     let displacement = Displacement::new(RANGE);
-    let surface = DisplacedSurface::new(mesh.clone(), map.clone(), displacement)
-        .expect("a sphere that can be displaced");
+    let surface = DisplacedSurface::new(mesh.clone(), map.clone(), displacement);
+    Arc::new(surface.expect("a sphere that can be displaced"))
+}
+
+/// Prisms around `mesh` displaced by `map`, for the uniform march with steps of so many texels.
+pub fn prisms(mesh: &Arc<BaseMesh>, map: &Arc<DisplacementMap>, texels: f32) -> Prisms {
     let march = March::Uniform {
         step: Step::Texels(texels),
         jitter: false,
     };
-    Prisms::new(Arc::new(surface), march).expect("a step above zero")
+    Prisms::new(displaced(mesh, map), march).expect("a step above zero")
 }
 
 /// A rocky 16-bit map of `size` x `size` texels that repeats without a seam: ridged gradient noise

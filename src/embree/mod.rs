@@ -1,7 +1,7 @@
 //! Embree behind safe types.
 //!
 //! ```text
-//! Device -> SceneBuilder -- attach(UserGeometry | TriangleGeometry), attach_instance --> commit -> Scene
+//! Device -> SceneBuilder -- attach(UserGeometry | TriangleGeometry | GridGeometry), attach_instance --> commit -> Scene
 //! Scene  -- intersect1, occluded1, intersect8, occluded8 from any thread;  Scene -- reopen --> SceneBuilder (edit, commit again)
 //! ```
 //!
@@ -17,6 +17,7 @@ mod device;
 mod error;
 mod filter;
 mod geometry;
+mod grids;
 mod instance;
 mod prisms;
 mod scene;
@@ -26,11 +27,13 @@ mod tests;
 mod tracer;
 mod triangles;
 mod user;
+mod vertices;
 
 pub use device::{Device, DeviceOptions, Memory};
 pub use error::{EmbreeError, ErrorCode};
 pub use filter::HitFilter;
 pub use geometry::Geometry;
+pub use grids::{Grid, GridGeometry};
 pub use instance::{Instance, Prototype};
 pub use scene::{BuildQuality, Coherence, Scene, SceneBuilder, SceneEdit, SceneOptions};
 pub use tracer::{EmbreeOptions, EmbreeTracer};

@@ -168,6 +168,15 @@ impl SceneBuilder {
         self.edit().changed(id)
     }
 
+    /// Lets `change` move the vertices of triangle or grid geometry `id`.
+    pub fn move_vertices(
+        &mut self,
+        id: u32,
+        change: impl FnOnce(&mut [[f32; 3]]),
+    ) -> Result<(), EmbreeError> {
+        self.edit().move_vertices(id, change)
+    }
+
     fn edit(&mut self) -> SceneEdit<'_> {
         SceneEdit {
             geometries: &mut self.geometries,
@@ -222,7 +231,7 @@ impl SceneBuilder {
     }
 }
 
-/// The part of a scene that can change in place: the hit tests of its user geometries.
+/// The part of a scene that can change in place: the hit tests of its user geometries and the vertices of the others.
 pub struct SceneEdit<'s> {
     geometries: &'s mut [Geometry],
 }
@@ -242,6 +251,24 @@ impl SceneEdit<'_> {
     /// As [`SceneBuilder::changed`].
     pub fn changed(&mut self, id: u32) -> Result<(), EmbreeError> {
         self.user_geometry(id)?.commit()
+    }
+
+    /// As [`SceneBuilder::move_vertices`].
+    pub fn move_vertices(
+        &mut self,
+        id: u32,
+        change: impl FnOnce(&mut [[f32; 3]]),
+    ) -> Result<(), EmbreeError> {
+        let geometry = self
+            .geometries
+            .get_mut(id as usize)
+            .filter(|g| g.kind == Kind::Mesh)
+            .ok_or(EmbreeError::NotInScene {
+                what: "triangle or grid geometry",
+                id,
+            })?;
+        geometry.move_vertices(change)?;
+        geometry.commit()
     }
 
     fn user_geometry(&mut self, id: u32) -> Result<&mut Geometry, EmbreeError> {
