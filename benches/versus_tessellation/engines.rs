@@ -46,15 +46,11 @@ pub const BASELINE: &str = "triangles";
 
 /// A scene of `geometries` on a device of its own, so that its memory is counted alone.
 fn build<G: Into<Geometry>>(
-    quality: BuildQuality,
+    options: SceneOptions,
     geometries: impl FnOnce(&Device) -> Result<Vec<G>, EmbreeError>,
 ) -> Scene {
     let scene = || {
         let device = Device::new(&DeviceOptions::default())?;
-        let options = SceneOptions {
-            quality,
-            ..SceneOptions::default()
-        };
         let mut builder = SceneBuilder::new(&device, options)?;
         for geometry in geometries(&device)? {
             builder.attach(geometry)?;
@@ -94,7 +90,7 @@ fn prisms_of(surface: &Surface) -> Arc<Prisms> {
 impl PrismEngine {
     fn new(surface: &Surface) -> Self {
         let prisms = prisms_of(surface);
-        let scene = build(BuildQuality::Medium, |device| {
+        let scene = build(SceneOptions::default(), |device| {
             Ok(vec![UserGeometry::new(device, prisms.clone())?])
         });
         Self {
@@ -137,11 +133,12 @@ impl Triangles {
     fn new(surface: &Surface) -> Self {
         let tessellation = Tessellation::new(Pattern::Barycentric, surface);
         let mut triangles = Vec::with_capacity(tessellation.triangle_count());
-        for (prim, piece) in (0..).zip(&tessellation.pieces) {
-            triangles.extend(tessellation.triangles_of(prim, piece.first));
+        for prim in 0..tessellation.pieces {
+            let first = tessellation.range(prim).start as u32;
+            triangles.extend(tessellation.triangles_from(first));
         }
         let positions = tessellation.positions(surface);
-        let scene = build(BuildQuality::Medium, |device| {
+        let scene = build(SceneOptions::default(), |device| {
             let geometry = TriangleGeometry::from_buffers(device, positions, triangles)?;
             Ok(vec![geometry])
         });
@@ -188,8 +185,8 @@ fn displace_touched(
     })
 }
 
-/// Embree's triangles in one geometry per base triangle, in a scene of low build quality: an edit builds only what it
-/// touches, and the tree over the geometries.
+/// Embree's triangles in one geometry per base triangle, in a dynamic scene of low build quality: only so does Embree
+/// keep the trees of geometries that an edit does not touch.
 struct PatchedTriangles {
     tessellation: Tessellation,
     scene: Option<Scene>,
@@ -200,16 +197,20 @@ impl PatchedTriangles {
     fn new(surface: &Surface) -> Self {
         let tessellation = Tessellation::new(Pattern::Barycentric, surface);
         let positions = tessellation.positions(surface);
-        let scene = build(BuildQuality::Low, |device| {
-            let patch = |prim: usize| {
-                let prim = prim as u32;
+        let options = SceneOptions {
+            quality: BuildQuality::Low,
+            dynamic: true,
+            ..SceneOptions::default()
+        };
+        let scene = build(options, |device| {
+            let patch = |prim| {
                 TriangleGeometry::from_buffers(
                     device,
                     positions[tessellation.range(prim)].to_vec(),
-                    tessellation.triangles_of(prim, 0).collect(),
+                    tessellation.triangles_from(0).collect(),
                 )
             };
-            (0..tessellation.pieces.len()).map(patch).collect()
+            (0..tessellation.pieces).map(patch).collect()
         });
         Self {
             size: sizes(surface, tessellation.triangle_count()),
@@ -256,7 +257,7 @@ impl Grids {
     fn new(surface: &Surface) -> Self {
         let tessellation = Tessellation::new(Pattern::Grids, surface);
         let positions = tessellation.positions(surface);
-        let scene = build(BuildQuality::Medium, |device| {
+        let scene = build(SceneOptions::default(), |device| {
             let grids = tessellation.grids();
             Ok(vec![GridGeometry::from_buffers(device, positions, &grids)?])
         });

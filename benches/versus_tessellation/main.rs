@@ -1,7 +1,7 @@
 //! Prisms against tessellations of the same surface under Embree: `cargo bench --bench versus_tessellation`.
 //!
 //! The displaced unit sphere of the other benches (1280 base triangles, a 16-bit map of rock) as prisms, as triangles
-//! with about one vertex per texel, and as Embree's grids of the same density. All engines trace the same rays in the
+//! with one vertex per texel, and as Embree's grids of the same density. All engines trace the same rays in the
 //! same rounds, one by one and as packets of eight, on one thread and on two. Tessellations get what is fastest for
 //! them: scenes without Embree's robust flag, and a vertex set per base triangle without stitching.
 //! Options after `--`: `--map TEXELS`, `--size PIXELS`, `--rounds N`, `--only TEXT` (engines whose name has it).
@@ -18,7 +18,7 @@ use common::rays::{Packets, Rays};
 use common::scene::{displaced, rock_map, sphere};
 use common::timing::{RayTimes, Times, option, word};
 use engines::{BASELINE, ENGINES, Engine};
-use prismarch::embree::{Coherence, Scene};
+use prismarch::embree::{Coherence, Memory, Scene};
 use prismarch::ray::{Aabb, Ray, RayPacket};
 use prismarch::surface::{DisplacedSurface, DisplacementMap, Texels};
 use prismarch::trace::{Hit, Tracer};
@@ -46,6 +46,8 @@ struct Contestant {
     name: &'static str,
     engine: Box<dyn Engine>,
     build: f64,
+    /// Embree's, after the build.
+    memory: Memory,
     /// By manner and number of threads.
     times: [[RayTimes; THREADS.len()]; MANNERS.len()],
     edits: Times,
@@ -63,9 +65,11 @@ fn main() {
         .filter(|(name, _)| name.contains(&only))
         .map(|(name, build)| {
             let mut built = Times::default();
+            let engine = built.time(|| build(&surface));
             Contestant {
                 name,
-                engine: built.time(|| build(&surface)),
+                memory: engine.scene().device().memory(),
+                engine,
                 build: built.median(),
                 times: Default::default(),
                 edits: Times::default(),
@@ -199,7 +203,7 @@ fn print_costs(contestants: &[Contestant], edited_in: f64) {
     println!("| engine | size | Embree | Embree, peak | buffers | peak | build | edit |");
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for contestant in contestants {
-        let memory = contestant.engine.scene().device().memory();
+        let memory = contestant.memory;
         let megabytes = |bytes: usize| bytes as f64 / 1e6;
         let buffers = megabytes(contestant.engine.bytes());
         println!(

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 use prismarch::embree::Grid;
-use prismarch::surface::{DisplacedSurface, Patch};
+use prismarch::surface::DisplacedSurface;
 use rayon::prelude::*;
 
 /// Texels that were edited.
@@ -14,26 +14,31 @@ pub struct Rect {
     pub side: usize,
 }
 
-/// How a base triangle is cut. Every base triangle has vertices of its own, so that it can be cut by itself.
+/// How base triangles are cut: all into the same number of pieces, so that neighbours have the same vertices on their
+/// shared edge, but each has vertices of its own, so that it can be displaced by itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pattern {
-    /// A barycentric grid: n^2 triangles, n the mean length of the base triangle's edges in texels. That is about
-    /// two triangles per texel of its footprint.
+    /// A barycentric grid: n^2 triangles.
     Barycentric,
     /// Three grids that meet at the centroid, each spanned by a corner, the middles of its two edges and the centroid.
-    /// Cells count as two triangles, of which there are as many as in the other pattern.
+    /// A cell counts as two triangles, of which there are as many as in the other pattern.
     Grids,
 }
 
 impl Pattern {
-    /// Pieces per edge of the base triangle, or cells per side of one of its grids.
-    fn cuts(self, patch: &Patch) -> u32 {
-        let [a, b, c] = patch.texels;
-        let mean = (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0;
+    /// Pieces per edge of a base triangle, or cells per side of one of its grids: one vertex, that is two triangles,
+    /// per texel of the smallest footprint that a base triangle has on the map. Larger ones are undersampled, in the
+    /// tessellations' favour: on a sphere of longitude and latitude those are the ones around the poles.
+    fn cuts(self, surface: &DisplacedSurface) -> u32 {
+        let footprint = |prim| {
+            let [a, b, c] = surface.patch(prim).texels;
+            0.5 * (b - a).perp_dot(c - a).abs()
+        };
+        let prims = 0..surface.mesh().triangles().len() as u32;
+        let triangles = 2.0 * prims.map(footprint).fold(f64::INFINITY, f64::min);
         let cuts = match self {
-            Self::Barycentric => mean,
-            // 3 * 2 m^2 = n^2
-            Self::Grids => mean / 6f64.sqrt(),
+            Self::Barycentric => triangles.sqrt(),
+            Self::Grids => (triangles / 6.0).sqrt(),
         };
         (cuts.round() as u32).max(1)
     }
@@ -79,71 +84,53 @@ impl Pattern {
     }
 }
 
-/// Where the vertices of one base triangle lie.
-#[derive(Clone, Copy)]
-pub struct Piece {
-    /// Index of the first.
-    pub first: u32,
-    cuts: u32,
-}
-
 /// How a surface is cut.
 pub struct Tessellation {
     pattern: Pattern,
-    /// By base triangle.
-    pub pieces: Vec<Piece>,
-    vertices: u32,
+    cuts: u32,
+    /// Base triangles.
+    pub pieces: u32,
 }
 
 impl Tessellation {
     /// Decides how `surface` is cut.
     pub fn new(pattern: Pattern, surface: &DisplacedSurface) -> Self {
-        let mut first = 0;
-        let mut pieces = Vec::new();
-        for prim in 0..surface.mesh().triangles().len() as u32 {
-            let cuts = pattern.cuts(&surface.patch(prim));
-            pieces.push(Piece { first, cuts });
-            first += pattern.vertices(cuts);
-        }
         Self {
             pattern,
-            pieces,
-            vertices: first,
+            cuts: pattern.cuts(surface),
+            pieces: surface.mesh().triangles().len() as u32,
         }
     }
 
     /// Triangles in all; a cell of a grid is two.
     pub fn triangle_count(&self) -> usize {
-        let triangles = |piece: &Piece| self.pattern.triangles(piece.cuts) as usize;
-        self.pieces.iter().map(triangles).sum()
+        (self.pieces * self.pattern.triangles(self.cuts)) as usize
+    }
+
+    fn vertex_count(&self) -> usize {
+        (self.pieces * self.pattern.vertices(self.cuts)) as usize
     }
 
     /// Bytes of all vertices.
     pub fn bytes_of_vertices(&self) -> usize {
-        self.vertices as usize * size_of::<[f32; 3]>()
+        self.vertex_count() * size_of::<[f32; 3]>()
     }
 
     /// All vertices, piece by piece.
     pub fn positions(&self, surface: &DisplacedSurface) -> Vec<[f32; 3]> {
-        let mut positions = vec![[0.0; 3]; self.vertices as usize];
-        let mut rest = &mut positions[..];
-        let mut parts = Vec::new();
-        for (prim, piece) in (0..).zip(&self.pieces) {
-            let (part, others) = rest.split_at_mut(self.pattern.vertices(piece.cuts) as usize);
-            parts.push((prim, part));
-            rest = others;
-        }
-        parts
-            .into_par_iter()
+        let mut positions = vec![[0.0; 3]; self.vertex_count()];
+        positions
+            .par_chunks_exact_mut(self.pattern.vertices(self.cuts) as usize)
             .with_max_len(8)
-            .for_each(|(prim, part)| self.displace(surface, prim, part));
+            .zip(0..self.pieces)
+            .for_each(|(part, prim)| self.displace(surface, prim, part));
         positions
     }
 
     /// The vertices of one piece.
     pub fn displace(&self, surface: &DisplacedSurface, prim: u32, out: &mut [[f32; 3]]) {
         let patch = surface.patch(prim);
-        let sites = self.pattern.sites(self.pieces[prim as usize].cuts);
+        let sites = self.pattern.sites(self.cuts);
         for (out, b) in out.iter_mut().zip(sites) {
             let normal = patch.normal(b.x, b.y).normalize();
             let position = patch.base(b.x, b.y) + patch.displacement(b.x, b.y) * normal;
@@ -153,14 +140,13 @@ impl Tessellation {
 
     /// Range of the vertices of one piece.
     pub fn range(&self, prim: u32) -> std::ops::Range<usize> {
-        let piece = self.pieces[prim as usize];
-        let first = piece.first as usize;
-        first..first + self.pattern.vertices(piece.cuts) as usize
+        let each = self.pattern.vertices(self.cuts) as usize;
+        each * prim as usize..each * (prim as usize + 1)
     }
 
     /// The triangles of a piece of the barycentric pattern whose first vertex is `first`.
-    pub fn triangles_of(&self, prim: u32, first: u32) -> impl Iterator<Item = [u32; 3]> {
-        let n = self.pieces[prim as usize].cuts;
+    pub fn triangles_from(&self, first: u32) -> impl Iterator<Item = [u32; 3]> {
+        let n = self.cuts;
         let row = move |j: u32| first + j * (n + 1) - j * j.saturating_sub(1) / 2;
         (0..n).flat_map(move |j| {
             let (a, b) = (row(j), row(j + 1));
@@ -174,17 +160,14 @@ impl Tessellation {
 
     /// All grids of the pattern of grids.
     pub fn grids(&self) -> Vec<Grid> {
-        let grids = |piece: &Piece| {
-            let side = piece.cuts + 1;
-            let first = piece.first;
-            [0, 1, 2].map(|k| Grid {
-                first: first + k * side * side,
-                stride: side,
-                width: side as u16,
-                height: side as u16,
-            })
+        let side = self.cuts + 1;
+        let grid = |k| Grid {
+            first: k * side * side,
+            stride: side,
+            width: side as u16,
+            height: side as u16,
         };
-        self.pieces.iter().flat_map(grids).collect()
+        (0..3 * self.pieces).map(grid).collect()
     }
 }
 

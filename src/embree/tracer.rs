@@ -68,6 +68,10 @@ impl EmbreeTracer {
     }
 }
 
+/// Where packets are said to be coherent, Embree tests boxes against the frustum of a packet and asks about lanes that
+/// miss the box: a prism's test costs more than that saves, even for the primary rays of neighbouring pixels.
+const COHERENCE: Coherence = Coherence::Incoherent;
+
 fn geometry(device: &Device, object: &Object) -> Result<Geometry, EmbreeError> {
     let geometry: Geometry = match &object.shape {
         Shape::Displaced(prisms) => UserGeometry::new(device, prisms.clone())?.into(),
@@ -110,11 +114,11 @@ impl Tracer for EmbreeTracer {
     }
 
     fn intersect8(&self, rays: &RayPacket) -> [Option<Hit>; RayPacket::LANES] {
-        self.scene.intersect8(rays, Coherence::Coherent)
+        self.scene.intersect8(rays, COHERENCE)
     }
 
     fn occluded8(&self, rays: &RayPacket) -> u8 {
-        self.scene.occluded8(rays, Coherence::Coherent)
+        self.scene.occluded8(rays, COHERENCE)
     }
 
     fn bounds(&self) -> Aabb {

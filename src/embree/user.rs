@@ -42,6 +42,8 @@ pub trait HitTest: Send + Sync {
     /// [`intersect`](Self::intersect) for the lanes whose bits are set in `valid`, at least one. The other lanes may
     /// hold anything, and what is returned for them is not looked at.
     ///
+    /// Where the rays of a packet have parted, Embree asks about one lane at a time.
+    ///
     /// Lanes that are valid hold valid rays, but for instances whose transform makes them something else.
     fn intersect8(
         &self,

@@ -146,8 +146,8 @@ mod tests {
         };
         let rays: Vec<Ray> = (0..9).map(ray).collect();
         let packet = RayPacket::from_rays(&rays);
-        for lane in 0..8 {
-            assert_eq!(packet.ray(lane), rays[lane]);
+        for (lane, ray) in rays[..8].iter().enumerate() {
+            assert_eq!(packet.ray(lane), *ray);
         }
         assert_eq!(packet.valid(), 0xff);
         assert_eq!(RayPacket::from_rays(&rays[..3]).valid(), 0b111);
