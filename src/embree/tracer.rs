@@ -68,8 +68,8 @@ impl EmbreeTracer {
     }
 }
 
-/// Where packets are said to be coherent, Embree tests boxes against the frustum of a packet and asks about lanes that
-/// miss the box: a prism's test costs more than that saves, even for the primary rays of neighbouring pixels.
+/// Where packets are said to be coherent, Embree keeps them together until two lanes are left, and asks occlusion tests
+/// about lanes that miss the box: a prism's test costs more than that saves.
 const COHERENCE: Coherence = Coherence::Incoherent;
 
 fn geometry(device: &Device, object: &Object) -> Result<Geometry, EmbreeError> {
