@@ -24,6 +24,12 @@ _Static_assert(sizeof(pm_ray) == sizeof(struct RTCRay) && _Alignof(pm_ray) == _A
                    offsetof(pm_ray, mask) == offsetof(struct RTCRay, mask) &&
                    offsetof(pm_ray, id) == offsetof(struct RTCRay, id),
                "pm_ray must be RTCRay");
+_Static_assert(sizeof(pm_ray8) == sizeof(struct RTCRay8) && _Alignof(pm_ray8) == _Alignof(struct RTCRay8) &&
+                   offsetof(pm_ray8, dir) == offsetof(struct RTCRay8, dir_x) &&
+                   offsetof(pm_ray8, tfar) == offsetof(struct RTCRay8, tfar) &&
+                   offsetof(pm_ray8, mask) == offsetof(struct RTCRay8, mask) &&
+                   offsetof(pm_ray8, id) == offsetof(struct RTCRay8, id),
+               "pm_ray8 must be RTCRay8");
 _Static_assert((int)PM_ERROR_INVALID_ARGUMENT == (int)RTC_ERROR_INVALID_ARGUMENT &&
                    (int)PM_ERROR_INVALID_OPERATION == (int)RTC_ERROR_INVALID_OPERATION &&
                    (int)PM_ERROR_OUT_OF_MEMORY == (int)RTC_ERROR_OUT_OF_MEMORY &&
@@ -39,6 +45,10 @@ _Static_assert((int)PM_SCENE_DYNAMIC == (int)RTC_SCENE_FLAG_DYNAMIC &&
                    (int)PM_SCENE_COMPACT == (int)RTC_SCENE_FLAG_COMPACT &&
                    (int)PM_SCENE_ROBUST == (int)RTC_SCENE_FLAG_ROBUST,
                "scene flags");
+_Static_assert(sizeof(pm_grid) == sizeof(struct RTCGrid) &&
+                   offsetof(pm_grid, stride) == offsetof(struct RTCGrid, stride) &&
+                   offsetof(pm_grid, height) == offsetof(struct RTCGrid, height),
+               "pm_grid must be RTCGrid");
 _Static_assert(PM_INVALID_ID == RTC_INVALID_GEOMETRY_ID, "invalid id");
 
 struct pm_device {
@@ -115,8 +125,8 @@ static void invoke_occluded_filter(const void *args, const struct RTCFilterFunct
 #endif
 }
 
-/* Without a filter, whether a ray is occluded needs no hit. */
-static inline bool has_occluded_filter(const struct pm_geometry *g, const query_context *context) {
+/* Without a filter, whether a ray is occluded needs no hit, and the first hit of a primitive is final. */
+static inline bool has_filter(const struct pm_geometry *g, const query_context *context) {
 #if PM_EMBREE_MAJOR == 3
   return g->filter || context->filter;
 #else
@@ -205,7 +215,7 @@ static inline void intersect_lanes(const struct RTCIntersectFunctionNArguments *
 static inline void occluded_lanes(const struct RTCOccludedFunctionNArguments *args, unsigned n) {
   const query q = {args->geometryUserPtr, args,         args->context,
                    invoke_occluded_filter, args->primID, args->geomID};
-  const bool filtered = has_occluded_filter(q.geometry, args->context);
+  const bool filtered = has_filter(q.geometry, args->context);
   for (unsigned i = 0; i < n; i++) {
     if (args->valid[i] != -1)
       continue;
@@ -220,19 +230,100 @@ static inline void occluded_lanes(const struct RTCOccludedFunctionNArguments *ar
   }
 }
 
-/* A constant N lets the compiler drop the strides for single rays. */
+/* Up to PM_LANES neighbouring lanes of N. */
+typedef struct group {
+  int *valid;
+  unsigned first, count;
+  uint32_t bits; /* the valid ones */
+} group;
+
+static inline group group_at(int *valid, unsigned n, unsigned first) {
+  group g = {valid + first, first, n - first < PM_LANES ? n - first : PM_LANES, 0};
+  for (unsigned i = 0; i < g.count; i++)
+    g.bits |= (uint32_t)(g.valid[i] == -1) << i;
+  return g;
+}
+
+/* The rays of a group, where they are if that is a pm_ray8, else in `copy`. */
+static inline const pm_ray8 *group_rays(const group *g, const void *rays, unsigned n, pm_ray8 *copy) {
+  if (n == PM_LANES && (uintptr_t)rays % _Alignof(pm_ray8) == 0)
+    return rays;
+  memset(copy, 0, sizeof *copy);
+  for (unsigned w = 0; w < RAY_WORDS; w++)
+    memcpy((char *)copy + 4 * PM_LANES * w, (const char *)rays + 4 * ((size_t)w * n + g->first),
+           (size_t)4 * g->count);
+  return copy;
+}
+
+static inline void intersect_groups(const struct RTCIntersectFunctionNArguments *args, unsigned n) {
+  const struct pm_geometry *geometry = args->geometryUserPtr;
+  char *rays = (char *)args->rayhit;
+  char *hits = rays + (size_t)sizeof(struct RTCRay) * n;
+  for (unsigned first = 0; first < n; first += PM_LANES) {
+    const group g = group_at(args->valid, n, first);
+    if (!g.bits)
+      continue;
+    pm_ray8 copy;
+    const pm_ray8 *eight = group_rays(&g, rays, n, &copy);
+    pm_hit at[PM_LANES];
+    const uint32_t found = geometry->test.intersect8(geometry->test_user, args->primID, eight, g.bits, at);
+    for (unsigned i = 0; i < g.count; i++) {
+      if (!(g.bits >> i & 1))
+        continue;
+      const bool is_hit = (found >> i & 1) && at[i].t > eight->tnear[i] && at[i].t < eight->tfar[i];
+      if (is_hit) {
+        struct RTCHit hit;
+        fill_hit(&hit, &at[i], args->geomID, args->context);
+        store_tfar(rays, at[i].t, n, first + i);
+        store_words(hits, &hit, HIT_WORDS, n, first + i);
+      }
+      report(&g.valid[i], is_hit);
+    }
+  }
+}
+
+static inline void occluded_groups(const struct RTCOccludedFunctionNArguments *args, unsigned n) {
+  const struct pm_geometry *geometry = args->geometryUserPtr;
+  for (unsigned first = 0; first < n; first += PM_LANES) {
+    const group g = group_at(args->valid, n, first);
+    if (!g.bits)
+      continue;
+    pm_ray8 copy;
+    const pm_ray8 *eight = group_rays(&g, args->ray, n, &copy);
+    const uint32_t found = geometry->test.occluded8(geometry->test_user, args->primID, eight, g.bits);
+    for (unsigned i = 0; i < g.count; i++) {
+      if (!(g.bits >> i & 1))
+        continue;
+      if (found >> i & 1)
+        store_tfar(args->ray, -INFINITY, n, first + i);
+      report(&g.valid[i], found >> i & 1);
+    }
+  }
+}
+
+/* A constant N lets the compiler drop the strides for single rays and packets of 8. */
 static void on_intersect(const struct RTCIntersectFunctionNArguments *args) {
+  const struct pm_geometry *g = args->geometryUserPtr;
   if (args->N == 1)
     intersect_lanes(args, 1);
-  else
+  else if (!g->test.intersect8 || has_filter(g, args->context))
     intersect_lanes(args, args->N);
+  else if (args->N == PM_LANES)
+    intersect_groups(args, PM_LANES);
+  else
+    intersect_groups(args, args->N);
 }
 
 static void on_occluded(const struct RTCOccludedFunctionNArguments *args) {
+  const struct pm_geometry *g = args->geometryUserPtr;
   if (args->N == 1)
     occluded_lanes(args, 1);
-  else
+  else if (!g->test.occluded8 || has_filter(g, args->context))
     occluded_lanes(args, args->N);
+  else if (args->N == PM_LANES)
+    occluded_groups(args, PM_LANES);
+  else
+    occluded_groups(args, args->N);
 }
 
 static void on_bounds(const struct RTCBoundsFunctionArguments *args) {
@@ -357,13 +448,27 @@ pm_geometry *pm_geometry_new_user(const pm_device *device, const pm_hit_test *te
   return g;
 }
 
+void pm_geometry_set_vertices(pm_geometry *g, const float *vertices, uint32_t vertex_count) {
+  rtcSetSharedGeometryBuffer(g->rtc, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0, 12, vertex_count);
+}
+
 pm_geometry *pm_geometry_new_triangles(const pm_device *device, const float *vertices, uint32_t vertex_count,
                                        const uint32_t *indices, uint32_t triangle_count) {
   pm_geometry *g = new_geometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   if (!g)
     return NULL;
-  rtcSetSharedGeometryBuffer(g->rtc, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0, 12, vertex_count);
+  pm_geometry_set_vertices(g, vertices, vertex_count);
   rtcSetSharedGeometryBuffer(g->rtc, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices, 0, 12, triangle_count);
+  return g;
+}
+
+pm_geometry *pm_geometry_new_grids(const pm_device *device, const float *vertices, uint32_t vertex_count,
+                                   const pm_grid *grids, uint32_t grid_count) {
+  pm_geometry *g = new_geometry(device, RTC_GEOMETRY_TYPE_GRID);
+  if (!g)
+    return NULL;
+  pm_geometry_set_vertices(g, vertices, vertex_count);
+  rtcSetSharedGeometryBuffer(g->rtc, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID, grids, 0, sizeof *grids, grid_count);
   return g;
 }
 
@@ -461,4 +566,68 @@ bool pm_occluded1(const pm_scene *scene, const pm_ray *ray) {
   rtcOccluded1((RTCScene)scene, &query, NULL);
 #endif
   return query.tfar == -INFINITY;
+}
+
+/* Packets ----------------------------------------------------------------------------------------- */
+
+typedef struct lane_mask {
+  _Alignas(32) int valid[PM_LANES];
+} lane_mask;
+
+static inline lane_mask mask_of(uint32_t bits) {
+  lane_mask mask;
+  for (unsigned i = 0; i < PM_LANES; i++)
+    mask.valid[i] = bits >> i & 1 ? -1 : 0;
+  return mask;
+}
+
+uint32_t pm_intersect8(const pm_scene *scene, const pm_ray8 *rays, uint32_t valid, bool coherent,
+                       pm_scene_hit hits[PM_LANES]) {
+  const lane_mask mask = mask_of(valid);
+  struct RTCRayHit8 query;
+  memcpy(&query.ray, rays, sizeof query.ray);
+  memset(query.hit.geomID, 0xff, sizeof query.hit.geomID); /* PM_INVALID_ID */
+  memset(query.hit.instID, 0xff, sizeof query.hit.instID);
+#if PM_EMBREE_MAJOR == 3
+  struct RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  rtcIntersect8(mask.valid, (RTCScene)scene, &context, &query);
+#else
+  struct RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  rtcIntersect8(mask.valid, (RTCScene)scene, &query, &arguments);
+#endif
+  uint32_t found = 0;
+  for (unsigned i = 0; i < PM_LANES; i++) {
+    if (!(valid >> i & 1) || query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID)
+      continue;
+    found |= 1u << i;
+    struct RTCHit hit;
+    load_words(&hit, &query.hit, HIT_WORDS, PM_LANES, i);
+    unpack_hit(&hits[i], query.ray.tfar[i], &hit);
+  }
+  return found;
+}
+
+uint32_t pm_occluded8(const pm_scene *scene, const pm_ray8 *rays, uint32_t valid, bool coherent) {
+  const lane_mask mask = mask_of(valid);
+  struct RTCRay8 query;
+  memcpy(&query, rays, sizeof query);
+#if PM_EMBREE_MAJOR == 3
+  struct RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  rtcOccluded8(mask.valid, (RTCScene)scene, &context, &query);
+#else
+  struct RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  rtcOccluded8(mask.valid, (RTCScene)scene, &query, &arguments);
+#endif
+  uint32_t found = 0;
+  for (unsigned i = 0; i < PM_LANES; i++)
+    found |= (uint32_t)((valid >> i & 1) && query.tfar[i] == -INFINITY) << i;
+  return found;
 }

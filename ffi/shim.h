@@ -12,6 +12,9 @@
 /* Instance levels a hit reports; the library may have more, but is asked for no more. */
 #define PM_INSTANCE_LEVELS 1
 
+/* Rays of a packet. */
+#define PM_LANES 8
+
 /* No geometry, no instance. */
 #define PM_INVALID_ID 0xffffffffu
 
@@ -46,6 +49,18 @@ typedef struct pm_ray {
   uint32_t flags;
 } pm_ray;
 
+/* Eight rays, word for word Embree's RTCRay8. */
+typedef struct pm_ray8 {
+  _Alignas(32) float org[3][PM_LANES];
+  float tnear[PM_LANES];
+  float dir[3][PM_LANES];
+  float time[PM_LANES];
+  float tfar[PM_LANES];
+  uint32_t mask[PM_LANES];
+  uint32_t id[PM_LANES];
+  uint32_t flags[PM_LANES];
+} pm_ray8;
+
 /* Where a ray meets one primitive. ng need not be of unit length; prim is the primID to report, which need not
  * be the number of the primitive that was tested: one primitive may hold many. */
 typedef struct pm_hit {
@@ -64,12 +79,24 @@ typedef struct pm_scene_hit {
 /* The test of one primitive of a user geometry. Called from many threads at once; must not unwind.
  *   bounds     writes min x y z, max x y z, wide enough for any rounding in a box test.
  *   intersect  the first hit with t in (tnear, tfar); fills `hit` and returns true, or returns false.
- *   occluded   whether there is one. */
+ *   occluded   whether there is one.
+ * The same for the lanes of a packet whose bits are set in `valid`, the others hold anything; either may be NULL,
+ * then lanes are asked one by one, as they are wherever there is a filter:
+ *   intersect8  fills hits[i] and sets bit i of the result for every lane i that hits.
+ *   occluded8   sets bit i for every lane i that is occluded. */
 typedef struct pm_hit_test {
   void (*bounds)(const void *user, uint32_t prim, float out[6]);
   bool (*intersect)(const void *user, uint32_t prim, const pm_ray *ray, pm_hit *hit);
   bool (*occluded)(const void *user, uint32_t prim, const pm_ray *ray);
+  uint32_t (*intersect8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid, pm_hit hits[PM_LANES]);
+  uint32_t (*occluded8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid);
 } pm_hit_test;
+
+/* A regular grid of width x height vertices, `stride` vertices from one row to the next: word for word RTCGrid. */
+typedef struct pm_grid {
+  uint32_t first, stride;
+  uint16_t width, height;
+} pm_grid;
 
 /* Whether a candidate hit counts; ray->tfar is the candidate's t. A rejected one lets the ray go on. */
 typedef bool (*pm_filter)(const void *user, const pm_ray *ray, const pm_scene_hit *candidate);
@@ -105,12 +132,17 @@ pm_geometry *pm_geometry_new_user(const pm_device *device, const pm_hit_test *te
 /* Both arrays are shared, not copied: vertices as x y z with 4 readable bytes after the last one. */
 pm_geometry *pm_geometry_new_triangles(const pm_device *device, const float *vertices, uint32_t vertex_count,
                                        const uint32_t *indices, uint32_t triangle_count);
+/* The same for grids, whose cells are two triangles each. */
+pm_geometry *pm_geometry_new_grids(const pm_device *device, const float *vertices, uint32_t vertex_count,
+                                   const pm_grid *grids, uint32_t grid_count);
 /* `transform`: object to world, 4 columns of 3. */
 pm_geometry *pm_geometry_new_instance(const pm_device *device, pm_scene *scene, const float transform[12]);
 void pm_geometry_free(pm_geometry *geometry);
 
 /* Another test for a user geometry. */
 void pm_geometry_set_test(pm_geometry *geometry, const pm_hit_test *test, const void *user, uint32_t primitives);
+/* The vertices of triangles or grids have moved, perhaps to another array of the same length. */
+void pm_geometry_set_vertices(pm_geometry *geometry, const float *vertices, uint32_t vertex_count);
 void pm_geometry_set_mask(pm_geometry *geometry, uint32_t mask);
 /* Sets the intersection and the occlusion filter; not for instances. */
 void pm_geometry_set_filter(pm_geometry *geometry, pm_filter filter, const void *user);
@@ -127,8 +159,15 @@ void pm_scene_commit(pm_scene *scene);
 /* min x y z, max x y z of a committed scene; inverted when it is empty. */
 void pm_scene_bounds(const pm_scene *scene, float out[6]);
 
-/* Both ask a committed scene, from any number of threads. */
+/* All ask a committed scene, from any number of threads. */
 bool pm_intersect1(const pm_scene *scene, const pm_ray *ray, pm_scene_hit *hit);
 bool pm_occluded1(const pm_scene *scene, const pm_ray *ray);
+
+/* The same for the lanes whose bits are set in `valid`; the others may hold anything. Bit i of the result tells of
+ * lane i; hits[i] is written where it is set. `coherent`: the rays go the same way from about the same place, which
+ * Embree then relies on for speed alone. */
+uint32_t pm_intersect8(const pm_scene *scene, const pm_ray8 *rays, uint32_t valid, bool coherent,
+                       pm_scene_hit hits[PM_LANES]);
+uint32_t pm_occluded8(const pm_scene *scene, const pm_ray8 *rays, uint32_t valid, bool coherent);
 
 #endif

@@ -1,6 +1,10 @@
-//! The words every room shares: a ray, and an axis-aligned box.
+//! The words every room shares: a ray, eight of them, and an axis-aligned box.
+
+mod packet;
 
 use glam::Vec3;
+
+pub use packet::{RayPacket, lanes_of};
 
 /// A ray `origin + t * direction` for `t` in (`tnear`, `tfar`).
 ///

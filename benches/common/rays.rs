@@ -3,7 +3,7 @@
 use std::f32::consts::TAU;
 
 use glam::Vec3;
-use prismarch::ray::Ray;
+use prismarch::ray::{Ray, RayPacket};
 use prismarch::trace::Tracer;
 
 use super::scene::random;
@@ -13,7 +13,7 @@ const TNEAR: f32 = 1e-3;
 
 /// Primary rays with the hits' secondary rays; all unit directions.
 pub struct Rays {
-    /// `size` x `size`, row by row: a pinhole camera that the displaced unit sphere fills.
+    /// `size` x `size` in tiles of 4 x 2, the tiles row by row: a pinhole camera that the displaced unit sphere fills.
     pub primary: Vec<Ray>,
     /// From every primary hit in a cosine-distributed direction around the geometric normal.
     pub bounce: Vec<Ray>,
@@ -23,6 +23,10 @@ pub struct Rays {
 
 impl Rays {
     /// The rays for `size` x `size` pixels; `tracer` finds where secondary rays start.
+    ///
+    /// # Panics
+    ///
+    /// When `size` is not a multiple of 4.
     pub fn new(size: u32, tracer: &dyn Tracer) -> Self {
         let primary = primary(size);
         let mut bounce = Vec::new();
@@ -59,12 +63,47 @@ fn primary(size: u32) -> Vec<Ray> {
     let right = forward.cross(Vec3::Z).normalize();
     let up = right.cross(forward);
     let on_film = |i: u32| ((i as f32 + 0.5) / size as f32 * 2.0 - 1.0) * HALF_WIDTH;
+    assert!(
+        size.is_multiple_of(4),
+        "{size} pixels are no tiles of 4 x 2"
+    );
+    let pixel = |i: u32| {
+        let (tile, lane) = (i / 8, i % 8);
+        let (x, y) = (tile % (size / 4), tile / (size / 4));
+        (4 * x + lane % 4, 2 * y + lane / 4)
+    };
     (0..size * size)
         .map(|i| {
-            let direction = forward + on_film(i % size) * right - on_film(i / size) * up;
+            let (x, y) = pixel(i);
+            let direction = forward + on_film(x) * right - on_film(y) * up;
             Ray::new(EYE, direction.normalize())
         })
         .collect()
+}
+
+/// The same rays as packets of eight neighbours; the last packet of a kind may have empty lanes.
+pub struct Packets {
+    /// The tiles.
+    pub primary: Vec<RayPacket>,
+    /// From eight primary hits in the order of their rays.
+    pub bounce: Vec<RayPacket>,
+    /// As `bounce`.
+    pub occlusion: Vec<RayPacket>,
+}
+
+impl Packets {
+    /// All rays, in their order.
+    pub fn new(rays: &Rays) -> Self {
+        let packets = |rays: &[Ray]| {
+            let eights = rays.chunks(RayPacket::LANES);
+            eights.map(RayPacket::from_rays).collect()
+        };
+        Self {
+            primary: packets(&rays.primary),
+            bounce: packets(&rays.bounce),
+            occlusion: packets(&rays.occlusion),
+        }
+    }
 }
 
 /// A cosine-distributed unit direction around the unit vector `normal`: a point on the unit sphere

@@ -81,12 +81,16 @@ fn texcoords(face: [Vec3; 3]) -> [Vec2; 3] {
     })
 }
 
-/// Prisms around `mesh` displaced by `map` with a range of 0 .. [`RANGE`].
-pub fn prisms(mesh: &Arc<BaseMesh>, map: &Arc<DisplacementMap>, march: March) -> Prisms {
+/// `mesh` displaced by `map` with a range of 0 .. [`RANGE`].
+pub fn displaced(mesh: &Arc<BaseMesh>, map: &Arc<DisplacementMap>) -> Arc<DisplacedSurface> {
     let displacement = Displacement::new(RANGE);
-    let surface = DisplacedSurface::new(mesh.clone(), map.clone(), displacement)
-        .expect("a sphere that can be displaced");
-    Prisms::new(Arc::new(surface), march).expect("a step above zero")
+    let surface = DisplacedSurface::new(mesh.clone(), map.clone(), displacement);
+    Arc::new(surface.expect("a sphere that can be displaced"))
+}
+
+/// Prisms around `mesh` displaced by `map`.
+pub fn prisms(mesh: &Arc<BaseMesh>, map: &Arc<DisplacementMap>, march: March) -> Prisms {
+    Prisms::new(displaced(mesh, map), march).expect("a step above zero")
 }
 
 /// The paper's march with a step in texels.

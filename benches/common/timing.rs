@@ -4,10 +4,10 @@ use std::hint::black_box;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use prismarch::ray::Ray;
+use prismarch::ray::{Ray, RayPacket};
 use prismarch::trace::Tracer;
 
-use super::rays::Rays;
+use super::rays::{Packets, Rays};
 
 /// Seconds of every round of one contestant.
 #[derive(Clone, Debug, Default)]
@@ -41,22 +41,52 @@ pub enum Query {
 
 /// Traces all rays on `threads` threads and returns the number of hits.
 pub fn trace(tracer: &dyn Tracer, rays: &[Ray], query: Query, threads: usize) -> usize {
-    const CHUNK: usize = 4096;
+    in_chunks(rays, 4096, threads, |ray| {
+        usize::from(match query {
+            Query::Intersect => black_box(tracer.intersect(ray)).is_some(),
+            Query::Occluded => tracer.occluded(ray),
+        })
+    })
+}
+
+/// Traces all packets on `threads` threads and returns the number of hits.
+pub fn trace_packets(
+    tracer: &dyn Tracer,
+    packets: &[RayPacket],
+    query: Query,
+    threads: usize,
+) -> usize {
+    in_chunks(
+        packets,
+        4096 / RayPacket::LANES,
+        threads,
+        |packet| match query {
+            Query::Intersect => black_box(tracer.intersect8(packet))
+                .iter()
+                .flatten()
+                .count(),
+            Query::Occluded => tracer.occluded8(packet).count_ones() as usize,
+        },
+    )
+}
+
+/// The sum of `count` over all items, taken in chunks by `threads` threads.
+fn in_chunks<T: Sync>(
+    items: &[T],
+    size: usize,
+    threads: usize,
+    count: impl Fn(&T) -> usize + Sync,
+) -> usize {
     let next = AtomicUsize::new(0);
-    let hits = AtomicUsize::new(0);
+    let sum = AtomicUsize::new(0);
     let work = || {
         loop {
-            let start = next.fetch_add(CHUNK, Ordering::Relaxed);
-            let Some(rest) = rays.get(start..) else { break };
-            let chunk = &rest[..rest.len().min(CHUNK)];
-            let found = match query {
-                Query::Intersect => chunk
-                    .iter()
-                    .filter(|ray| black_box(tracer.intersect(ray)).is_some())
-                    .count(),
-                Query::Occluded => chunk.iter().filter(|ray| tracer.occluded(ray)).count(),
+            let start = next.fetch_add(size, Ordering::Relaxed);
+            let Some(rest) = items.get(start..) else {
+                break;
             };
-            hits.fetch_add(found, Ordering::Relaxed);
+            let chunk = &rest[..rest.len().min(size)];
+            sum.fetch_add(chunk.iter().map(&count).sum(), Ordering::Relaxed);
         }
     };
     if threads == 1 {
@@ -68,7 +98,7 @@ pub fn trace(tracer: &dyn Tracer, rays: &[Ray], query: Query, threads: usize) ->
             }
         });
     }
-    hits.into_inner()
+    sum.into_inner()
 }
 
 /// Times of the three kinds of rays.
@@ -91,15 +121,31 @@ impl RayTimes {
             .time(|| trace(tracer, &rays.occlusion, Query::Occluded, threads));
     }
 
-    /// Three cells of a Markdown table: millions of rays per second, median over the rounds.
-    pub fn cells(&self, rays: &Rays) -> String {
+    /// One more round of the same rays as packets.
+    pub fn round_of_packets(&mut self, tracer: &dyn Tracer, packets: &Packets, threads: usize) {
+        let intersect = Query::Intersect;
+        self.primary
+            .time(|| trace_packets(tracer, &packets.primary, intersect, threads));
+        self.bounce
+            .time(|| trace_packets(tracer, &packets.bounce, intersect, threads));
+        self.occlusion
+            .time(|| trace_packets(tracer, &packets.occlusion, Query::Occluded, threads));
+    }
+
+    /// Millions of rays per second, median over the rounds: primary, bounce, occlusion.
+    pub fn rates(&self, rays: &Rays) -> [f64; 3] {
         let rate = |rays: &[Ray], times: &Times| rays.len() as f64 / times.median() / 1e6;
-        format!(
-            "{:.2} | {:.2} | {:.2}",
+        [
             rate(&rays.primary, &self.primary),
             rate(&rays.bounce, &self.bounce),
             rate(&rays.occlusion, &self.occlusion),
-        )
+        ]
+    }
+
+    /// The rates as three cells of a Markdown table.
+    pub fn cells(&self, rays: &Rays) -> String {
+        let [primary, bounce, occlusion] = self.rates(rays);
+        format!("{primary:.2} | {bounce:.2} | {occlusion:.2}")
     }
 }
 
@@ -109,12 +155,17 @@ impl RayTimes {
 ///
 /// When what follows is not a number.
 pub fn option(name: &str, default: usize) -> usize {
-    let mut arguments = std::env::args().skip_while(|argument| argument != name);
-    arguments.next();
-    match arguments.next() {
+    match word(name) {
         Some(value) => value
             .parse()
             .unwrap_or_else(|_| panic!("{name} {value}: expected a number")),
         None => default,
     }
+}
+
+/// The word after `--name` on the command line.
+pub fn word(name: &str) -> Option<String> {
+    let mut arguments = std::env::args().skip_while(|argument| argument != name);
+    arguments.next();
+    arguments.next()
 }

@@ -105,6 +105,16 @@ pub enum EmbreeError {
         /// Largest number.
         max: usize,
     },
+    /// A triangle or grid that reads beyond the vertices, or a grid that is too small or too large.
+    #[error("{what} {index} does not fit its {vertices} vertices")]
+    BadElement {
+        /// Of what kind.
+        what: &'static str,
+        /// Its number.
+        index: usize,
+        /// How many vertices there are.
+        vertices: usize,
+    },
     /// A transform without an inverse, or one that is not finite.
     #[error(
         "the transform of an instance has determinant {determinant}; expected an invertible, finite one"

@@ -21,8 +21,11 @@ pub struct Geometry {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     User,
-    Triangles,
-    Instance { prototype: u32 },
+    /// Triangles or grids: what has a [`VertexBuffer`](super::vertices::VertexBuffer).
+    Mesh,
+    Instance {
+        prototype: u32,
+    },
 }
 
 // SAFETY: a geometry is changed only through `&mut self` or by value; what it keeps is Send + Sync.

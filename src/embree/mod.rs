@@ -1,8 +1,8 @@
 //! Embree behind safe types.
 //!
 //! ```text
-//! Device -> SceneBuilder -- attach(UserGeometry | TriangleGeometry), attach_instance --> commit -> Scene
-//! Scene  -- intersect1, occluded1 from any thread;  Scene -- reopen --> SceneBuilder (edit, commit again)
+//! Device -> SceneBuilder -- attach(UserGeometry | TriangleGeometry | GridGeometry), attach_instance --> commit -> Scene
+//! Scene  -- intersect1, occluded1, intersect8, occluded8 from any thread;  Scene -- reopen --> SceneBuilder (edit, commit again)
 //! ```
 //!
 //! Only a committed [`Scene`] can be traced and only an uncommitted [`SceneBuilder`] can be changed; the
@@ -17,6 +17,7 @@ mod device;
 mod error;
 mod filter;
 mod geometry;
+mod grids;
 mod instance;
 mod prisms;
 mod scene;
@@ -26,13 +27,15 @@ mod tests;
 mod tracer;
 mod triangles;
 mod user;
+mod vertices;
 
 pub use device::{Device, DeviceOptions, Memory};
 pub use error::{EmbreeError, ErrorCode};
 pub use filter::HitFilter;
 pub use geometry::Geometry;
+pub use grids::{Grid, GridGeometry};
 pub use instance::{Instance, Prototype};
-pub use scene::{BuildQuality, Scene, SceneBuilder, SceneEdit, SceneOptions};
+pub use scene::{BuildQuality, Coherence, Scene, SceneBuilder, SceneEdit, SceneOptions};
 pub use tracer::{EmbreeOptions, EmbreeTracer};
 pub use triangles::TriangleGeometry;
 pub use user::{HitTest, UserGeometry};

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::geometry::{Kind, count};
+use super::user::packet_to_raw;
 use super::{Device, EmbreeError, Geometry, HitTest, Instance, Prototype, sys};
-use crate::ray::{Aabb, Ray};
+use crate::ray::{Aabb, Ray, RayPacket};
 use crate::trace::{Hit, MAX_INSTANCE_LEVELS};
 
 const _: () = assert!(MAX_INSTANCE_LEVELS == sys::PM_INSTANCE_LEVELS as usize);
@@ -167,6 +168,15 @@ impl SceneBuilder {
         self.edit().changed(id)
     }
 
+    /// Lets `change` move the vertices of triangle or grid geometry `id`.
+    pub fn move_vertices(
+        &mut self,
+        id: u32,
+        change: impl FnOnce(&mut [[f32; 3]]),
+    ) -> Result<(), EmbreeError> {
+        self.edit().move_vertices(id, change)
+    }
+
     fn edit(&mut self) -> SceneEdit<'_> {
         SceneEdit {
             geometries: &mut self.geometries,
@@ -221,7 +231,7 @@ impl SceneBuilder {
     }
 }
 
-/// The part of a scene that can change in place: the hit tests of its user geometries.
+/// The part of a scene that can change in place: the hit tests of its user geometries and the vertices of the others.
 pub struct SceneEdit<'s> {
     geometries: &'s mut [Geometry],
 }
@@ -243,6 +253,24 @@ impl SceneEdit<'_> {
         self.user_geometry(id)?.commit()
     }
 
+    /// As [`SceneBuilder::move_vertices`].
+    pub fn move_vertices(
+        &mut self,
+        id: u32,
+        change: impl FnOnce(&mut [[f32; 3]]),
+    ) -> Result<(), EmbreeError> {
+        let geometry = self
+            .geometries
+            .get_mut(id as usize)
+            .filter(|g| g.kind == Kind::Mesh)
+            .ok_or(EmbreeError::NotInScene {
+                what: "triangle or grid geometry",
+                id,
+            })?;
+        geometry.move_vertices(change)?;
+        geometry.commit()
+    }
+
     fn user_geometry(&mut self, id: u32) -> Result<&mut Geometry, EmbreeError> {
         self.geometries
             .get_mut(id as usize)
@@ -252,6 +280,15 @@ impl SceneEdit<'_> {
                 id,
             })
     }
+}
+
+/// What Embree may expect of the rays of a packet; answers do not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coherence {
+    /// They go the same way from about the same place, like those of neighbouring pixels.
+    Coherent,
+    /// They part soon.
+    Incoherent,
 }
 
 /// A committed scene: traceable from any number of threads, and unchangeable.
@@ -298,17 +335,7 @@ impl Scene {
         if !ray.is_valid() {
             return None;
         }
-        let mut hit = sys::pm_scene_hit {
-            at: sys::pm_hit {
-                t: 0.0,
-                u: 0.0,
-                v: 0.0,
-                ng: [0.0; 3],
-                prim: 0,
-            },
-            geom: 0,
-            inst: [0; MAX_INSTANCE_LEVELS],
-        };
+        let mut hit = BLANK_HIT;
         // SAFETY: a live, committed scene; the shim reads the ray and writes the hit.
         let found = unsafe { sys::pm_intersect1(self.raw(), &ray_to_raw(ray), &mut hit) };
         found.then(|| hit_from_raw(&hit))
@@ -319,7 +346,56 @@ impl Scene {
         // SAFETY: a live, committed scene; the shim reads the ray.
         ray.is_valid() && unsafe { sys::pm_occluded1(self.raw(), &ray_to_raw(ray)) }
     }
+
+    /// [`intersect1`](Self::intersect1) for every lane: none for empty ones.
+    ///
+    /// Hits on user geometry are those of single rays to the bit, unless two primitives are hit at the same t, where
+    /// either may be named; Embree's own triangles are hit alike up to rounding.
+    pub fn intersect8(
+        &self,
+        rays: &RayPacket,
+        coherence: Coherence,
+    ) -> [Option<Hit>; RayPacket::LANES] {
+        let mut hits = [BLANK_HIT; RayPacket::LANES];
+        // SAFETY: a live, committed scene; the shim reads the packet and writes up to eight hits.
+        let found = unsafe {
+            sys::pm_intersect8(
+                self.raw(),
+                packet_to_raw(rays),
+                rays.valid().into(),
+                coherence == Coherence::Coherent,
+                hits.as_mut_ptr(),
+            )
+        };
+        std::array::from_fn(|lane| (found >> lane & 1 == 1).then(|| hit_from_raw(&hits[lane])))
+    }
+
+    /// [`occluded1`](Self::occluded1) for every lane: bit i tells of lane i, and is 0 for an empty one.
+    pub fn occluded8(&self, rays: &RayPacket, coherence: Coherence) -> u8 {
+        // SAFETY: a live, committed scene; the shim reads the packet.
+        let bits = unsafe {
+            sys::pm_occluded8(
+                self.raw(),
+                packet_to_raw(rays),
+                rays.valid().into(),
+                coherence == Coherence::Coherent,
+            )
+        };
+        bits as u8 // as many bits as lanes
+    }
 }
+
+const BLANK_HIT: sys::pm_scene_hit = sys::pm_scene_hit {
+    at: sys::pm_hit {
+        t: 0.0,
+        u: 0.0,
+        v: 0.0,
+        ng: [0.0; 3],
+        prim: 0,
+    },
+    geom: 0,
+    inst: [0; MAX_INSTANCE_LEVELS],
+};
 
 fn ray_to_raw(ray: &Ray) -> sys::pm_ray {
     sys::pm_ray {

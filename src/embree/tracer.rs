@@ -3,10 +3,10 @@
 use glam::Affine3A;
 
 use super::{
-    BuildQuality, Device, DeviceOptions, EmbreeError, Geometry, Instance, Scene, SceneBuilder,
-    SceneOptions, TriangleGeometry, UserGeometry,
+    BuildQuality, Coherence, Device, DeviceOptions, EmbreeError, Geometry, Instance, Scene,
+    SceneBuilder, SceneOptions, TriangleGeometry, UserGeometry,
 };
-use crate::ray::{Aabb, Ray};
+use crate::ray::{Aabb, Ray, RayPacket};
 use crate::trace::{Hit, Object, Placement, Shape, Tracer, World};
 
 /// How Embree builds a world.
@@ -68,6 +68,10 @@ impl EmbreeTracer {
     }
 }
 
+/// Where packets are said to be coherent, Embree keeps them together until two lanes are left, and asks occlusion tests
+/// about lanes that miss the box: a prism's test costs more than that saves.
+const COHERENCE: Coherence = Coherence::Incoherent;
+
 fn geometry(device: &Device, object: &Object) -> Result<Geometry, EmbreeError> {
     let geometry: Geometry = match &object.shape {
         Shape::Displaced(prisms) => UserGeometry::new(device, prisms.clone())?.into(),
@@ -107,6 +111,14 @@ impl Tracer for EmbreeTracer {
 
     fn occluded(&self, ray: &Ray) -> bool {
         self.scene.occluded1(ray)
+    }
+
+    fn intersect8(&self, rays: &RayPacket) -> [Option<Hit>; RayPacket::LANES] {
+        self.scene.intersect8(rays, COHERENCE)
+    }
+
+    fn occluded8(&self, rays: &RayPacket) -> u8 {
+        self.scene.occluded8(rays, COHERENCE)
     }
 
     fn bounds(&self) -> Aabb {

@@ -1,9 +1,9 @@
-//! Plain triangles: undisplaced meshes in the same scene.
+//! Plain triangles: undisplaced meshes in the same scene, and tessellations to compare with.
 
 use std::sync::Arc;
 
-use super::geometry::{Kind, count};
-use super::{Device, EmbreeError, Geometry, sys};
+use super::vertices::{Elements, check_indices};
+use super::{Device, EmbreeError, Geometry};
 use crate::surface::BaseMesh;
 
 /// A triangle mesh, traced by Embree itself.
@@ -15,34 +15,29 @@ impl From<TriangleGeometry> for Geometry {
     }
 }
 
-/// What Embree reads: the mesh's indices as they are, its positions with the padding that 16-byte loads want.
-struct Buffers {
-    positions: Vec<[f32; 3]>,
-    mesh: Arc<BaseMesh>,
-}
-
 impl TriangleGeometry {
     /// The triangles of `mesh`: its indices are shared, its positions copied.
     pub fn new(device: &Device, mesh: Arc<BaseMesh>) -> Result<Self, EmbreeError> {
-        let vertices = count("vertices", mesh.positions().len())?;
-        let triangles = count("triangles", mesh.triangles().len())?;
-        let mut positions: Vec<[f32; 3]> = Vec::with_capacity(mesh.positions().len() + 1);
-        positions.extend(mesh.positions().iter().map(|p| p.to_array()));
-        positions.push([0.0; 3]);
-        let buffers = Arc::new(Buffers { positions, mesh });
-        // SAFETY: both arrays are as long as said (one vertex of padding besides) and kept with the geometry;
-        // neither is ever written again.
-        let geometry = unsafe {
-            Geometry::from_raw(device, Kind::Triangles, buffers.clone(), || {
-                sys::pm_geometry_new_triangles(
-                    device.raw(),
-                    buffers.positions.as_ptr().cast(),
-                    vertices,
-                    buffers.mesh.triangles().as_ptr().cast(),
-                    triangles,
-                )
-            })
-        };
-        geometry.map(Self)
+        // Embree loads 16 bytes for each vertex, which a mesh has not got after its last.
+        let positions = mesh.positions().iter().map(|p| p.to_array()).collect();
+        // SAFETY: the indices of a mesh are in range.
+        unsafe { Geometry::over_vertices(device, positions, Elements::Mesh(mesh)) }.map(Self)
+    }
+
+    /// Triangles as they are, counter-clockwise from outside. Nothing is copied.
+    ///
+    /// # Errors
+    ///
+    /// [`EmbreeError::BadElement`] for an index that is no vertex's.
+    pub fn from_buffers(
+        device: &Device,
+        positions: Vec<[f32; 3]>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self, EmbreeError> {
+        let largest = triangles.iter().map(|&[a, b, c]| a.max(b).max(c).into());
+        check_indices("triangle", largest, positions.len())?;
+        // SAFETY: just checked.
+        unsafe { Geometry::over_vertices(device, positions, Elements::Triangles(triangles)) }
+            .map(Self)
     }
 }

@@ -4,6 +4,7 @@
 //! out per type; its pointer is stored when the geometry is made.
 
 use std::ffi::c_void;
+use std::mem::offset_of;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use super::device::DeviceState;
 use super::geometry::Kind;
 use super::{Device, EmbreeError, Geometry, sys};
 use crate::prism::PrismHit;
-use crate::ray::{Aabb, Ray};
+use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
 
 /// The hit test of a set of primitives, called from many threads at once.
 ///
@@ -36,6 +37,32 @@ pub trait HitTest: Send + Sync {
     /// Whether there is any.
     fn occluded(&self, prim: u32, ray: &Ray) -> bool {
         self.intersect(prim, ray).is_some()
+    }
+
+    /// [`intersect`](Self::intersect) for the lanes whose bits are set in `valid`, at least one. The other lanes may
+    /// hold anything, and what is returned for them is not looked at.
+    ///
+    /// Where the rays of a packet have parted, Embree asks about one lane at a time.
+    ///
+    /// Lanes that are valid hold valid rays, but for instances whose transform makes them something else.
+    fn intersect8(
+        &self,
+        prim: u32,
+        rays: &RayPacket,
+        valid: u8,
+    ) -> [Option<PrismHit>; RayPacket::LANES] {
+        let mut hits = [None; RayPacket::LANES];
+        for lane in lanes_of(valid) {
+            hits[lane] = self.intersect(prim, &rays.ray(lane));
+        }
+        hits
+    }
+
+    /// [`occluded`](Self::occluded) for the lanes whose bits are set in `valid`: bit i of the result tells of lane i.
+    fn occluded8(&self, prim: u32, rays: &RayPacket, valid: u8) -> u8 {
+        lanes_of(valid)
+            .filter(|&lane| self.occluded(prim, &rays.ray(lane)))
+            .fold(0, |bits, lane| bits | 1 << lane)
     }
 }
 
@@ -109,6 +136,8 @@ impl<T: HitTest + 'static> Stored<T> {
         bounds: Some(Self::on_bounds),
         intersect: Some(Self::on_intersect),
         occluded: Some(Self::on_occluded),
+        intersect8: Some(Self::on_intersect8),
+        occluded8: Some(Self::on_occluded8),
     };
 
     fn new(device: &Device, test: Arc<T>) -> Result<Arc<Self>, EmbreeError> {
@@ -161,15 +190,8 @@ impl<T: HitTest + 'static> Stored<T> {
         let (stored, ray) = unsafe { (&*user.cast::<Self>(), &*ray) };
         let found = stored.caught(None, || stored.test.intersect(prim, &ray_from_raw(ray)));
         let Some(found) = found else { return false };
-        let raw = sys::pm_hit {
-            t: found.t,
-            u: found.u,
-            v: found.v,
-            ng: found.ng.to_array(),
-            prim: found.prim,
-        };
         // SAFETY: the shim's pointer is valid for a write.
-        unsafe { hit.write(raw) };
+        unsafe { hit.write(hit_to_raw(&found)) };
         true
     }
 
@@ -181,6 +203,79 @@ impl<T: HitTest + 'static> Stored<T> {
         // SAFETY: as in `on_intersect`.
         let (stored, ray) = unsafe { (&*user.cast::<Self>(), &*ray) };
         stored.caught(false, || stored.test.occluded(prim, &ray_from_raw(ray)))
+    }
+
+    /// A panic loses all lanes.
+    unsafe extern "C" fn on_intersect8(
+        user: *const c_void,
+        prim: u32,
+        rays: *const sys::pm_ray8,
+        valid: u32,
+        hits: *mut sys::pm_hit,
+    ) -> u32 {
+        // SAFETY: `user` is the Stored<T> given with CALLBACKS; `rays` is valid during the call.
+        let (stored, rays) = unsafe { (&*user.cast::<Self>(), packet_from_raw(rays)) };
+        let valid = valid as u8; // as many bits as lanes
+        let found = stored.caught([None; RayPacket::LANES], || {
+            stored.test.intersect8(prim, rays, valid)
+        });
+        let mut bits = 0;
+        for lane in lanes_of(valid) {
+            if let Some(hit) = &found[lane] {
+                bits |= 1 << lane;
+                // SAFETY: the shim's pointer is valid for a write of eight.
+                unsafe { hits.add(lane).write(hit_to_raw(hit)) };
+            }
+        }
+        bits
+    }
+
+    unsafe extern "C" fn on_occluded8(
+        user: *const c_void,
+        prim: u32,
+        rays: *const sys::pm_ray8,
+        valid: u32,
+    ) -> u32 {
+        // SAFETY: as in `on_intersect8`.
+        let (stored, rays) = unsafe { (&*user.cast::<Self>(), packet_from_raw(rays)) };
+        let valid = valid as u8; // as many bits as lanes
+        stored
+            .caught(0, || stored.test.occluded8(prim, rays, valid))
+            .into()
+    }
+}
+
+// A packet is a `pm_ray8`: what the shim reads and hands on is the packet itself.
+const _: () = assert!(
+    RayPacket::LANES == sys::PM_LANES as usize
+        && size_of::<RayPacket>() == size_of::<sys::pm_ray8>()
+        && align_of::<RayPacket>() == align_of::<sys::pm_ray8>()
+        && offset_of!(RayPacket, origin) == offset_of!(sys::pm_ray8, org)
+        && offset_of!(RayPacket, tnear) == offset_of!(sys::pm_ray8, tnear)
+        && offset_of!(RayPacket, direction) == offset_of!(sys::pm_ray8, dir)
+        && offset_of!(RayPacket, tfar) == offset_of!(sys::pm_ray8, tfar)
+        && offset_of!(RayPacket, mask) == offset_of!(sys::pm_ray8, mask)
+        && offset_of!(RayPacket, key) == offset_of!(sys::pm_ray8, id)
+);
+
+/// # Safety
+/// `rays` is valid for reads as long as the reference is used.
+unsafe fn packet_from_raw<'r>(rays: *const sys::pm_ray8) -> &'r RayPacket {
+    // SAFETY: the same layout, and any bits are numbers.
+    unsafe { &*rays.cast::<RayPacket>() }
+}
+
+pub(super) fn packet_to_raw(rays: &RayPacket) -> *const sys::pm_ray8 {
+    std::ptr::from_ref(rays).cast()
+}
+
+fn hit_to_raw(hit: &PrismHit) -> sys::pm_hit {
+    sys::pm_hit {
+        t: hit.t,
+        u: hit.u,
+        v: hit.v,
+        ng: hit.ng.to_array(),
+        prim: hit.prim,
     }
 }
 

@@ -4,7 +4,7 @@ mod world;
 
 use glam::Vec3;
 
-use crate::ray::{Aabb, Ray};
+use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
 pub use world::{Object, Placement, Resolved, Shape, World};
 
 /// Instance levels a hit can hold: one, as Debian's Embree is built.
@@ -41,6 +41,20 @@ pub trait Tracer: Sync {
 
     /// Whether there is any hit with t in (tnear, tfar).
     fn occluded(&self, ray: &Ray) -> bool;
+
+    /// [`intersect`](Self::intersect) for every lane: none for empty ones. Meant for rays that go the same way from
+    /// about the same place, as those of neighbouring pixels; for rays that part, single ones may be faster.
+    fn intersect8(&self, rays: &RayPacket) -> [Option<Hit>; RayPacket::LANES] {
+        std::array::from_fn(|lane| self.intersect(&rays.ray(lane)))
+    }
+
+    /// [`occluded`](Self::occluded) for every lane: bit i tells of lane i, and is 0 for an empty one.
+    fn occluded8(&self, rays: &RayPacket) -> u8 {
+        let occluded = |lane: &usize| self.occluded(&rays.ray(*lane));
+        lanes_of(u8::MAX)
+            .filter(occluded)
+            .fold(0, |bits, lane| bits | 1 << lane)
+    }
 
     /// The box over everything.
     fn bounds(&self) -> Aabb;

@@ -1,5 +1,6 @@
-/* Packets: what the Rust side never sends, but pipelines do. One ball behind the shim's callbacks, traced
- * by single rays and by packets of 4, 8 and 16 with half of the lanes off; then the same with a filter.
+/* Packets: more than the Rust side ever sends, but pipelines do. One ball behind the shim's callbacks, traced
+ * by single rays and by packets of 4, 8 and 16 with a third of the lanes off, with a hit test for packets and
+ * without; then the same with a filter. The callbacks are also handed more lanes than any packet has.
  *
  * Includes the shim itself, which brings Embree's own calls. */
 #include "../../ffi/shim.c"
@@ -15,6 +16,11 @@ static int failures;
       failures++;                                                                                          \
     }                                                                                                      \
   } while (0)
+
+/* The ball is primitive 0; what it reports is another number, as a primitive that holds many does. */
+enum { REPORTED_PRIM = 41 };
+
+static unsigned packet_tests;
 
 static void ball_bounds(const void *user, uint32_t prim, float out[6]) {
   (void)user;
@@ -37,7 +43,7 @@ static bool ball_intersect(const void *user, uint32_t prim, const pm_ray *ray, p
   if (!(t > ray->tnear && t < ray->tfar))
     return false;
   hit->t = t;
-  hit->prim = prim;
+  hit->prim = prim + REPORTED_PRIM;
   hit->u = 0.25f;
   hit->v = 0.5f;
   for (int k = 0; k < 3; k++)
@@ -50,7 +56,27 @@ static bool ball_occluded(const void *user, uint32_t prim, const pm_ray *ray) {
   return ball_intersect(user, prim, ray, &hit);
 }
 
-static const pm_hit_test BALL = {ball_bounds, ball_intersect, ball_occluded};
+static uint32_t ball_intersect8(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid,
+                                pm_hit hits[PM_LANES]) {
+  uint32_t found = 0;
+  packet_tests++;
+  CHECK(valid != 0 && valid < 256);
+  for (unsigned i = 0; i < PM_LANES; i++) {
+    pm_ray ray;
+    load_words(&ray, rays, RAY_WORDS, PM_LANES, i);
+    if (valid >> i & 1)
+      found |= (uint32_t)ball_intersect(user, prim, &ray, &hits[i]) << i;
+  }
+  return found | ~valid; /* the shim must not believe the lanes it did not ask about */
+}
+
+static uint32_t ball_occluded8(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid) {
+  pm_hit hits[PM_LANES];
+  return ball_intersect8(user, prim, rays, valid, hits);
+}
+
+static const pm_hit_test BALL = {ball_bounds, ball_intersect, ball_occluded, NULL, NULL};
+static const pm_hit_test PACKET_BALL = {ball_bounds, ball_intersect, ball_occluded, ball_intersect8, ball_occluded8};
 
 /* Lets leaving crossings pass and drops entering ones. */
 static bool leaving(const void *user, const pm_ray *ray, const pm_scene_hit *hit) {
@@ -126,7 +152,7 @@ static void check_lane(const pm_scene *scene, const void *rays, unsigned n, unsi
   for (unsigned k = 0; k < 3; k++)
     CHECK(word(hits, k, n, i) == one.at.ng[k]);
   CHECK(word(hits, 3, n, i) == 0.25f && word(hits, 4, n, i) == 0.5f);
-  CHECK(id_word(hits, 5, n, i) == one.prim);
+  CHECK(id_word(hits, 5, n, i) == one.at.prim && one.at.prim == REPORTED_PRIM);
   CHECK(id_word(hits, 7, n, i) == one.inst[0]);
 }
 
@@ -144,6 +170,64 @@ static void check_packet(const pm_scene *scene, unsigned n, bool occluded) {
     check_lane(scene, &query, n, i, valid[i] == -1, occluded);
 }
 
+/* The shim's own packets, all masks; lanes that are off hold no ray at all. */
+static void check_masks(const pm_scene *scene, bool coherent) {
+  for (uint32_t valid = 0; valid < 256; valid++) {
+    pm_ray8 rays;
+    pm_scene_hit hits[PM_LANES];
+    memset(&rays, 0xff, sizeof rays);
+    for (unsigned i = 0; i < PM_LANES; i++) {
+      const pm_ray ray = lane(i);
+      if (valid >> i & 1)
+        store_words(&rays, &ray, RAY_WORDS, PM_LANES, i);
+    }
+    const uint32_t found = pm_intersect8(scene, &rays, valid, coherent, hits);
+    CHECK(found == pm_occluded8(scene, &rays, valid, coherent));
+    for (unsigned i = 0; i < PM_LANES; i++) {
+      const pm_ray ray = lane(i);
+      pm_scene_hit one;
+      const bool hit = (valid >> i & 1) && pm_intersect1(scene, &ray, &one);
+      CHECK(hit == (found >> i & 1));
+      CHECK(!hit || memcmp(&one, &hits[i], sizeof one) == 0);
+    }
+  }
+}
+
+/* Callbacks with a number of lanes that is no packet's. */
+static void check_lanes(const pm_scene *scene, pm_geometry *geometry, unsigned n) {
+  enum { MOST = 80 };
+  static _Alignas(64) uint32_t words[MOST * (RAY_WORDS + HIT_WORDS)];
+  int valid[MOST];
+  query_context context;
+#if PM_EMBREE_MAJOR == 3
+  rtcInitIntersectContext(&context);
+#else
+  rtcInitRayQueryContext(&context);
+#endif
+  for (int occluded = 0; occluded < 2; occluded++) {
+    memset(words, 0xff, sizeof words);
+    for (unsigned i = 0; i < n; i++) {
+      const pm_ray ray = lane(i);
+      store_words(words, &ray, RAY_WORDS, n, i);
+      valid[i] = i % 3 == 1 ? 0 : -1;
+    }
+    if (occluded) {
+      const struct RTCOccludedFunctionNArguments args = {
+          .valid = valid, .geometryUserPtr = geometry, .context = &context, .ray = (struct RTCRayN *)words, .N = n};
+      on_occluded(&args);
+    } else {
+      const struct RTCIntersectFunctionNArguments args = {.valid = valid,
+                                                          .geometryUserPtr = geometry,
+                                                          .context = &context,
+                                                          .rayhit = (struct RTCRayHitN *)words,
+                                                          .N = n};
+      on_intersect(&args);
+    }
+    for (unsigned i = 0; i < n; i++)
+      check_lane(scene, words, n, i, i % 3 != 1, occluded);
+  }
+}
+
 static void check_scene(const pm_scene *scene, float expected_t) {
   const pm_ray ray = lane(0);
   pm_scene_hit hit;
@@ -152,6 +236,8 @@ static void check_scene(const pm_scene *scene, float expected_t) {
     check_packet(scene, n, false);
     check_packet(scene, n, true);
   }
+  check_masks(scene, false);
+  check_masks(scene, true);
 }
 
 static pm_scene *scene_with(const pm_device *device, pm_geometry *geometry) {
@@ -162,29 +248,39 @@ static pm_scene *scene_with(const pm_device *device, pm_geometry *geometry) {
   return scene;
 }
 
+static void check_ball(const pm_device *device, bool filtered, const pm_hit_test *test) {
+  const float expected_t = filtered ? 3.0f : 2.0f; /* the direction's length is 2 */
+  pm_geometry *ball = pm_geometry_new_user(device, test, NULL, 1);
+  if (filtered)
+    pm_geometry_set_filter(ball, leaving, NULL);
+  packet_tests = 0;
+  pm_scene *inner = scene_with(device, ball);
+  check_scene(inner, expected_t);
+  const unsigned sizes[] = {2, 5, 8, 12, 16, 20, 64, 77};
+  if (test->intersect8 && !filtered) /* filters are run by Embree, which does not make these calls */
+    for (unsigned k = 0; k < sizeof sizes / sizeof *sizes; k++)
+      check_lanes(inner, ball, sizes[k]);
+
+  const float lifted[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 2};
+  pm_geometry *instance = pm_geometry_new_instance(device, inner, lifted);
+  pm_scene *outer = scene_with(device, instance);
+  check_scene(outer, expected_t + 1.0f);
+  CHECK((packet_tests > 0) == (test->intersect8 && !filtered));
+
+  pm_scene_free(outer);
+  pm_scene_free(inner);
+  pm_geometry_free(instance);
+  pm_geometry_free(ball);
+}
+
 int main(void) {
   int error;
   pm_device *device = pm_device_new("threads=1", NULL, fail_error, no_limit, &error);
   if (!device)
     return 2;
-  for (int filtered = 0; filtered < 2; filtered++) {
-    const float expected_t = filtered ? 3.0f : 2.0f; /* the direction's length is 2 */
-    pm_geometry *ball = pm_geometry_new_user(device, &BALL, NULL, 1);
-    if (filtered)
-      pm_geometry_set_filter(ball, leaving, NULL);
-    pm_scene *inner = scene_with(device, ball);
-    check_scene(inner, expected_t);
-
-    const float lifted[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 2};
-    pm_geometry *instance = pm_geometry_new_instance(device, inner, lifted);
-    pm_scene *outer = scene_with(device, instance);
-    check_scene(outer, expected_t + 1.0f);
-
-    pm_scene_free(outer);
-    pm_scene_free(inner);
-    pm_geometry_free(instance);
-    pm_geometry_free(ball);
-  }
+  for (int filtered = 0; filtered < 2; filtered++)
+    for (int packets = 0; packets < 2; packets++)
+      check_ball(device, filtered, packets ? &PACKET_BALL : &BALL);
   pm_device_free(device);
   if (!failures)
     printf("packets agree with single rays on Embree %s\n", RTC_VERSION_STRING);

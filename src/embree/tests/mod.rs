@@ -5,6 +5,7 @@ mod edit;
 mod faults;
 mod filter;
 mod instance;
+mod packet;
 mod scene;
 mod tracer;
 mod triangles;

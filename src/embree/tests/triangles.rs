@@ -1,5 +1,5 @@
 use super::*;
-use crate::embree::{Geometry, TriangleGeometry};
+use crate::embree::{EmbreeError, Geometry, Grid, GridGeometry, TriangleGeometry};
 use crate::surface::{BaseMesh, MeshBuilder, NormalMode};
 
 /// A strip of thin, tilted triangles, with vertices in no special order.
@@ -66,5 +66,89 @@ fn triangles_have_masks_and_filters_too() {
         let scene = scene(&mesh, change);
         assert_eq!(scene.intersect1(&ray).is_some(), seen);
         assert_eq!(scene.occluded1(&ray), seen);
+    }
+}
+
+/// `n` x `n` vertices over the square (0, 0) .. (1, 1) at z = 0, row by row.
+fn lattice(n: u16) -> Vec<[f32; 3]> {
+    let at = |i: u16| f32::from(i) / f32::from(n - 1);
+    (0..n)
+        .flat_map(|y| (0..n).map(move |x| [at(x), at(y), 0.0]))
+        .collect()
+}
+
+#[test]
+fn grids_and_triangles_of_the_same_vertices_are_the_same_surface() {
+    let device = device();
+    let n = 6u16;
+    let cells = (0..n - 1).flat_map(|y| (0..n - 1).map(move |x| u32::from(y * n + x)));
+    let side = u32::from(n);
+    let triangles = cells
+        .flat_map(|a| [[a, a + 1, a + side], [a + 1, a + side + 1, a + side]])
+        .collect();
+    let grid = Grid {
+        first: 0,
+        stride: side,
+        width: n,
+        height: n,
+    };
+    let geometries: [Geometry; 2] = [
+        TriangleGeometry::from_buffers(&device, lattice(n), triangles)
+            .unwrap()
+            .into(),
+        GridGeometry::from_buffers(&device, lattice(n), &[grid])
+            .unwrap()
+            .into(),
+    ];
+    for geometry in geometries {
+        let mut builder = SceneBuilder::new(&device, SceneOptions::default()).unwrap();
+        builder.attach(geometry).unwrap();
+        let scene = builder.commit().unwrap();
+        let t = |scene: &Scene, x: f32, y: f32| {
+            let hit = scene.intersect1(&Ray::new(Vec3::new(x, y, 2.0), -Vec3::Z));
+            hit.map(|hit| hit.t)
+        };
+        for (x, y) in [(0.01, 0.02), (0.5, 0.52), (0.97, 0.3)] {
+            assert_eq!(t(&scene, x, y), Some(2.0));
+        }
+        assert_eq!(t(&scene, 1.01, 0.5), None);
+
+        let mut builder = scene.reopen();
+        let lift = |vertices: &mut [[f32; 3]]| vertices.iter_mut().for_each(|v| v[2] += 0.5);
+        builder.move_vertices(0, lift).unwrap();
+        assert!(builder.move_vertices(1, lift).is_err());
+        assert_eq!(t(&builder.commit().unwrap(), 0.5, 0.52), Some(1.5));
+    }
+}
+
+#[test]
+fn indices_beyond_the_vertices_are_refused() {
+    let device = device();
+    let error = TriangleGeometry::from_buffers(&device, lattice(2), vec![[0, 1, 2], [1, 4, 2]]);
+    let told = |what, index| EmbreeError::BadElement {
+        what,
+        index,
+        vertices: 4,
+    };
+    assert_eq!(error.err(), Some(told("triangle", 1)));
+    let sound = Grid {
+        first: 0,
+        stride: 2,
+        width: 2,
+        height: 2,
+    };
+    for bad in [
+        Grid { first: 1, ..sound },
+        Grid { stride: 3, ..sound },
+        Grid { width: 1, ..sound },
+        Grid { height: 3, ..sound },
+        Grid {
+            stride: 0,
+            height: u16::MAX,
+            ..sound
+        },
+    ] {
+        let error = GridGeometry::from_buffers(&device, lattice(2), &[sound, bad]);
+        assert_eq!(error.err(), Some(told("grid", 1)), "{bad:?}");
     }
 }
