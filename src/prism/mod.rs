@@ -66,7 +66,7 @@ impl Prisms {
         let records: Vec<Prism> = (0..count)
             .map(|prim| Prism::new(&surface.patch(prim)))
             .collect();
-        let unit = surface.map().texels().unit();
+        let unit = surface.map().unit();
         let units = HeightUnits {
             texel_per_world: unit / surface.displacement().scale,
             texel_midlevel: unit * surface.displacement().midlevel,

@@ -11,7 +11,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
 use super::{Grid, LANES, Lanes};
-use crate::surface::Texels;
+use crate::surface::StoredTexels;
 
 #[derive(Clone, Copy)]
 pub struct Avx2(__m256);
@@ -122,27 +122,31 @@ impl Lanes for Avx2 {
         // SAFETY: AVX2 is there. 0 <= i <= width - 1 and 0 <= j <= height - 1, so index + stride + 1 is at most
         // (height + 1) * (width + 1) - 1, the last stored texel; it fits i32 because sides are at most
         // `DisplacementMap::MAX_SIDE`. The 32-bit loads of narrower texels start at such a texel and end inside
-        // the four texels that `DisplacementMap` stores after the last one.
+        // the four texels that `StoredTexels` keeps after the last one.
+        // An edit on another thread may store to these atomics meanwhile. They are atomics, so the compiler takes no
+        // value for constant, and the gather reads each texel with one plain load, as a relaxed load does: it is
+        // the old texel or the new one.
         unsafe {
             let stride = _mm256_set1_epi32(grid.stride as i32);
             let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
             let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
             let above = _mm256_add_epi32(index, stride);
             match grid.texels {
-                Texels::U8(t) => {
-                    let texels = t.as_ptr().cast();
+                StoredTexels::U8(t) => {
+                    let texels = t.as_ptr().cast::<i32>();
                     let (h00, h10) = pair::<8>(_mm256_i32gather_epi32::<1>(texels, index));
                     let (h01, h11) = pair::<8>(_mm256_i32gather_epi32::<1>(texels, above));
                     [h00, h10, h01, h11]
                 }
-                Texels::U16(t) => {
-                    let texels = t.as_ptr().cast();
+                StoredTexels::U16(t) => {
+                    let texels = t.as_ptr().cast::<i32>();
                     let (h00, h10) = pair::<16>(_mm256_i32gather_epi32::<2>(texels, index));
                     let (h01, h11) = pair::<16>(_mm256_i32gather_epi32::<2>(texels, above));
                     [h00, h10, h01, h11]
                 }
-                Texels::F32(t) => {
-                    let (left, right) = (t.as_ptr(), t.as_ptr().add(1));
+                StoredTexels::F32(t) => {
+                    let left = t.as_ptr().cast::<f32>();
+                    let right = left.add(1);
                     [
                         Self(_mm256_i32gather_ps::<4>(left, index)),
                         Self(_mm256_i32gather_ps::<4>(right, index)),

@@ -11,7 +11,7 @@ mod avx2;
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use crate::surface::{DisplacementMap, Texels, Wrap};
+use crate::surface::{DisplacementMap, StoredTexels, Wrap};
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -89,7 +89,7 @@ pub(crate) trait Lanes:
 /// A displacement map as the kernels see it.
 #[derive(Clone, Copy)]
 pub(crate) struct Grid<'m> {
-    texels: &'m Texels,
+    texels: &'m StoredTexels,
     stride: usize,
     wrap: Wrap,
     /// Texels across and up.
@@ -107,7 +107,7 @@ impl<'m> Grid<'m> {
         }
     }
 
-    /// Stored height (see [`Texels::unit`]) at texel coordinates, bilinear.
+    /// Stored height (see [`DisplacementMap::unit`]) at texel coordinates, bilinear.
     #[inline(always)]
     pub fn sample<L: Lanes>(&self, x: L, y: L) -> L {
         let (x, y) = (self.fold(x, self.size[0]), self.fold(y, self.size[1]));
@@ -145,6 +145,7 @@ impl<'m> Grid<'m> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::Texels;
     use glam::DVec2;
 
     fn maps() -> Vec<DisplacementMap> {
@@ -178,7 +179,7 @@ mod tests {
                 let got = grid.sample(L::from_array(x), L::from_array(y)).to_array();
                 for l in 0..LANES {
                     let want = map.sample(DVec2::new(x[l].into(), y[l].into())).height as f32;
-                    let unit = map.texels().unit();
+                    let unit = map.unit();
                     assert!(
                         (got[l] / unit - want).abs() < 1e-4 * want.abs().max(1.0),
                         "{:?} {}",

@@ -5,7 +5,7 @@ use std::ops::{Add, Div, Mul, Sub};
 use glam::Vec4;
 
 use super::{Grid, LANES, Lanes};
-use crate::surface::Texels;
+use crate::surface::{StoredTexels, Texel};
 
 #[derive(Clone, Copy)]
 pub struct Portable(Vec4, Vec4);
@@ -90,20 +90,15 @@ impl Lanes for Portable {
     #[inline(always)]
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4] {
         match grid.texels {
-            Texels::U8(t) => corners(t, grid, i, j),
-            Texels::U16(t) => corners(t, grid, i, j),
-            Texels::F32(t) => corners(t, grid, i, j),
+            StoredTexels::U8(t) => corners::<u8>(t, grid, i, j),
+            StoredTexels::U16(t) => corners::<u16>(t, grid, i, j),
+            StoredTexels::F32(t) => corners::<f32>(t, grid, i, j),
         }
     }
 }
 
 #[inline(always)]
-fn corners<T: Copy + Into<f32>>(
-    t: &[T],
-    grid: &Grid<'_>,
-    i: Portable,
-    j: Portable,
-) -> [Portable; 4] {
+fn corners<T: Texel>(t: &[T::Atomic], grid: &Grid<'_>, i: Portable, j: Portable) -> [Portable; 4] {
     let [width, height] = grid.size;
     let (i, j) = (i.to_array(), j.to_array());
     let mut out = [[0.0; LANES]; 4];
@@ -116,10 +111,10 @@ fn corners<T: Copy + Into<f32>>(
         let at = j * grid.stride + i;
         // One bounds check for the pair.
         let (bottom, top) = (&t[at..at + 2], &t[at + grid.stride..at + grid.stride + 2]);
-        out[0][l] = bottom[0].into();
-        out[1][l] = bottom[1].into();
-        out[2][l] = top[0].into();
-        out[3][l] = top[1].into();
+        out[0][l] = T::load(&bottom[0]).into();
+        out[1][l] = T::load(&bottom[1]).into();
+        out[2][l] = T::load(&top[0]).into();
+        out[3][l] = T::load(&top[1]).into();
     }
     [
         Portable::from_array(out[0]),
