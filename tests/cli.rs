@@ -258,12 +258,16 @@ fn info_counts_triangles_and_bytes() {
     assert_eq!(map["format"], "16-bit");
     let bytes = |value: &serde_json::Value| value.as_u64().unwrap();
     assert!(bytes(&map["bytes"]) >= 128);
+    // Finest blocks of 4x4 texels, then one of 8x8; pairs of 16 bits.
+    assert!(bytes(&map["pyramid_bytes"]) >= 4 * (4 + 1));
     let memory = &info["memory"];
     // 108 bytes per base triangle, as in the paper.
     assert_eq!(bytes(&memory["overhead"]["prisms"]), 2 * 108);
     let common = &memory["common"];
     let common = bytes(&common["maps"]) + bytes(&common["meshes"]) + bytes(&common["bvh"]);
-    assert_eq!(bytes(&memory["total"]), common + 2 * 108);
+    let pyramids = bytes(&memory["overhead"]["pyramids"]);
+    assert_eq!(pyramids, bytes(&map["pyramid_bytes"]));
+    assert_eq!(bytes(&memory["total"]), common + 2 * 108 + pyramids);
     let text = done(&folder, &["info", "scene.toml"]);
     for word in ["floor", "8x8", "16-bit", "overhead", "216 B"] {
         assert!(text.contains(word), "no {word} in {text}");

@@ -10,12 +10,11 @@ use super::engine::EngineArgs;
 use super::error::CliError;
 use super::memory::Memory;
 use crate::scene::{Loaded, MapFile, ObjectShape};
-use crate::surface::Texels;
 
 /// Tell what a scene is made of and what memory it takes
 ///
 /// Memory is divided into what every method of displacement needs (maps, base meshes, BVH) and the overhead of this one
-/// (prisms: 108 bytes per base triangle).
+/// (prisms: 108 bytes per base triangle; pyramids: about a sixth of their maps).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -84,8 +83,10 @@ struct Map {
     file: String,
     width: usize,
     height: usize,
-    format: &'static str,
+    format: String,
+    /// Of the texels.
     bytes: usize,
+    pyramid_bytes: usize,
 }
 
 impl From<&MapFile> for Map {
@@ -95,12 +96,9 @@ impl From<&MapFile> for Map {
             file: file.path.display().to_string(),
             width,
             height,
-            format: match file.map.texels() {
-                Texels::U8(_) => "8-bit",
-                Texels::U16(_) => "16-bit",
-                Texels::F32(_) => "float",
-            },
-            bytes: file.map.bytes(),
+            format: file.map.kind().to_string(),
+            bytes: file.map.texels().bytes(),
+            pyramid_bytes: file.map.pyramid().bytes(),
         }
     }
 }
@@ -153,7 +151,7 @@ impl fmt::Display for Info {
         }
         for map in &self.maps {
             let size = format!("{}x{}", map.width, map.height);
-            let (format, bytes) = (map.format, Bytes(map.bytes));
+            let (format, bytes) = (&map.format, Bytes(map.bytes));
             writeln!(f, "  {size:>11} {format:6} {bytes:>10}  {}", map.file)?;
         }
         f.write_char('\n')?;
@@ -172,6 +170,7 @@ impl Memory {
         row("base meshes", self.common.meshes)?;
         row("BVH", self.common.bvh)?;
         row("overhead: prisms", self.overhead.prisms)?;
+        row("overhead: pyramids of maps", self.overhead.pyramids)?;
         row("total", self.total)?;
         let pictures = Bytes(self.pictures);
         writeln!(

@@ -23,7 +23,7 @@ pub struct Memory {
 /// Bytes that every method needs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Common {
-    /// Displacement maps.
+    /// Texels of displacement maps.
     pub maps: usize,
     /// Base meshes.
     pub meshes: usize,
@@ -36,13 +36,15 @@ pub struct Common {
 pub struct Overhead {
     /// Prisms, 108 bytes per base triangle.
     pub prisms: usize,
+    /// Min/max pyramids of displacement maps.
+    pub pyramids: usize,
 }
 
 impl Memory {
     /// Adds up a built scene; what is shared counts once.
     pub fn of(loaded: &Loaded, world: &World, tracer: &dyn Tracer) -> Self {
         let common = Common {
-            maps: loaded.maps.iter().map(|m| m.map.bytes()).sum(),
+            maps: map_bytes(loaded) - pyramid_bytes(loaded),
             meshes: mesh_bytes(loaded),
             bvh: tracer.bvh_bytes(),
         };
@@ -52,17 +54,27 @@ impl Memory {
         });
         let overhead = Overhead {
             prisms: prisms.sum(),
+            pyramids: pyramid_bytes(loaded),
         };
-        let total = common.maps + common.meshes + common.bvh + overhead.prisms;
+        let added = overhead.prisms + overhead.pyramids;
+        let total = common.maps + common.meshes + common.bvh + added;
         Self {
             // Not 0: a scene has a mesh.
-            overhead_percent: 100.0 * overhead.prisms as f64 / total as f64,
+            overhead_percent: 100.0 * added as f64 / total as f64,
             common,
             overhead,
             total,
             pictures: picture_bytes(loaded),
         }
     }
+}
+
+fn map_bytes(loaded: &Loaded) -> usize {
+    loaded.maps.iter().map(|m| m.map.bytes()).sum()
+}
+
+fn pyramid_bytes(loaded: &Loaded) -> usize {
+    loaded.maps.iter().map(|m| m.map.pyramid().bytes()).sum()
 }
 
 fn mesh_bytes(loaded: &Loaded) -> usize {

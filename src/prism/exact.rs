@@ -14,7 +14,6 @@ pub struct ExactPrisms {
     pub clusters: Vec<Cluster>,
     /// Base triangles.
     prims: usize,
-    levels: Vec<super::simd::TmpLevel>,
 }
 
 impl ExactPrisms {
@@ -33,7 +32,6 @@ impl ExactPrisms {
                 .map(|prims| Cluster::new(surface, prims, offsets))
                 .collect(),
             prims,
-            levels: super::simd::tmp_levels(surface.map()),
         }
     }
 
@@ -134,10 +132,9 @@ impl Prisms {
         any: bool,
     ) -> Option<Found> {
         let member = self.member(cluster, lane);
-        let Parts::Exact(exact) = &self.parts else { return None };
         let problem = Problem {
             patch: &member.patch,
-            grid: &Grid::new(self.surface.map()).with_levels(&exact.levels),
+            grid: &Grid::new(self.surface.map()),
             offsets: member.offsets,
             ordered: !member.folded,
             any,

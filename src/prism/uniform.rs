@@ -25,7 +25,7 @@ pub struct UniformPrisms {
 impl UniformPrisms {
     pub fn new(surface: &DisplacedSurface) -> Self {
         let count = surface.mesh().triangles().len() as u32;
-        let unit = surface.map().texels().unit();
+        let unit = surface.map().unit();
         Self {
             records: (0..count)
                 .map(|prim| Prism::new(&surface.patch(prim)))

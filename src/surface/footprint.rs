@@ -1,144 +1,293 @@
 //! The range of heights under one triangle: every texel that a bilinear sample inside it can read.
+//!
+//! Samples within one texel of texel (i, j), in both directions, read it. So the texels are the integer points in the
+//! sum of the triangle and a square of half side 1 (and some slack): a convex region, here one copy of it for each
+//! repeat of the map that the triangle meets. Blocks of the pyramid that lie inside are taken whole, blocks outside are
+//! dropped, others cut up, down to texels; and what cannot widen the range any more is not looked into at all.
+
+mod region;
 
 use glam::DVec2;
 
-use super::{DisplacementMap, Texels, Wrap};
+use super::{DisplacementMap, Level, TexelRect, Wrap};
+use region::{Meets, Region, extent};
 
 /// Texels of slack around the triangle, against rounding of whoever samples.
 const SLACK: f64 = 0.05;
 
 impl DisplacementMap {
-    /// Smallest and largest height that samples in a triangle of texel coordinates can have; the whole map's where the
-    /// triangle covers about as much.
+    /// Smallest and largest height that samples in a triangle of texel coordinates can have, to the texel; the whole
+    /// map's where the triangle covers about as much. The time is that of the triangle's outline, not of its area.
     pub fn range_over(&self, corners: [DVec2; 3]) -> (f32, f32) {
-        let (low, high) = corners
-            .iter()
-            .fold((corners[0], corners[0]), |(a, b), &p| (a.min(p), b.max(p)));
-        let (width, height) = self.size();
-        if (high - low + 2.0).element_product() > (width * height) as f64 {
+        if self.is_covered_by(corners) {
             return self.range();
         }
-        match self.texels() {
-            Texels::U8(t) => self.scan(t, corners, [low.y, high.y]),
-            Texels::U16(t) => self.scan(t, corners, [low.y, high.y]),
-            Texels::F32(t) => self.scan(t, corners, [low.y, high.y]),
+        let mut found = Found::new(self);
+        for region in self.regions(corners) {
+            found.take(&region);
+        }
+        if self.wrap() == Wrap::Clamp {
+            found.take_edges(corners);
+        }
+        let unit = self.unit();
+        match found.range {
+            Some((low, high)) => (low / unit, high / unit),
+            None => self.range(),
         }
     }
 
-    fn scan<T: Copy + PartialOrd + Into<f32>>(
-        &self,
-        texels: &[T],
-        corners: [DVec2; 3],
-        [low, high]: [f64; 2],
-    ) -> (f32, f32) {
-        let (width, height) = self.size();
-        let mut range: Option<(T, T)> = None;
-        // Row j of texels is read by samples in the rows of cells below and above it.
-        for j in (low - SLACK).floor() as i64..=(high + SLACK).floor() as i64 + 1 {
-            let Some([from, to]) = extent(corners, j as f64 - 1.0 - SLACK, j as f64 + 1.0 + SLACK)
-            else {
-                continue;
-            };
-            let (first, last) = (
-                (from - SLACK).floor() as i64,
-                (to + SLACK).floor() as i64 + 1,
-            );
-            let row = self.wrap().texel(j, height) * self.stride();
-            for_runs(self.wrap(), first, last, width, |a, b| {
-                for &h in &texels[row + a..=row + b] {
-                    let (low, high) = range.unwrap_or((h, h));
-                    range = Some((
-                        if h < low { h } else { low },
-                        if h > high { h } else { high },
-                    ));
-                }
-            });
+    /// Whether samples in a triangle of texel coordinates can read a texel of `rect`: whether an edit there can change
+    /// [`Self::range_over`] of it or anything seen inside it.
+    pub fn overlaps(&self, corners: [DVec2; 3], rect: TexelRect) -> bool {
+        if self.is_covered_by(corners) {
+            return true;
         }
-        let unit = self.texels().unit();
-        range.map_or_else(
-            || self.range(),
-            |(low, high)| (low.into() / unit, high.into() / unit),
-        )
+        let (width, height) = self.size();
+        let (mut low, mut high) = ([rect.x as f64, rect.y as f64], [0.0; 2]);
+        high[0] = (rect.x + rect.width) as f64 - 1.0;
+        high[1] = (rect.y + rect.height) as f64 - 1.0;
+        if self.wrap() == Wrap::Clamp {
+            // Edge texels go on for ever.
+            for (k, last) in [(0, width - 1), (1, height - 1)] {
+                if low[k] == 0.0 {
+                    low[k] = f64::NEG_INFINITY;
+                }
+                if high[k] >= last as f64 {
+                    high[k] = f64::INFINITY;
+                }
+            }
+            let region = Region::new(corners);
+            let (low, high) = (DVec2::from(low), DVec2::from(high));
+            // Of the infinite part only what the triangle reaches.
+            let (low, high) = (low.max(region.low), high.min(region.high));
+            return low.cmple(high).all() && region.meets(low, high) != Meets::Outside;
+        }
+        self.regions(corners)
+            .any(|region| region.meets(low.into(), high.into()) != Meets::Outside)
+    }
+
+    /// A triangle whose bounds have the map's area or more, or are no numbers.
+    fn is_covered_by(&self, corners: [DVec2; 3]) -> bool {
+        let (low, high) = bounds(corners);
+        let (width, height) = self.size();
+        let covers = (high - low + 2.0).element_product() > (width * height) as f64;
+        covers || corners.iter().any(|p| !p.is_finite())
+    }
+
+    /// The triangle's region as it lies over each repeat of the map that it meets, in stored texels.
+    fn regions(&self, corners: [DVec2; 3]) -> impl Iterator<Item = Region> {
+        let (width, height) = self.size();
+        let (low, high) = bounds(corners);
+        let reach = DVec2::splat(1.0 + SLACK);
+        let (low, high) = ((low - reach).floor(), (high + reach).ceil());
+        let xs = repeats(self.wrap(), low.x, high.x, width);
+        let ys = repeats(self.wrap(), low.y, high.y, height);
+        ys.flat_map(move |y| {
+            xs.clone().map(move |x| {
+                Region::new(corners.map(|p| {
+                    DVec2::new(
+                        unfolded_from(self.wrap(), p.x, x, width),
+                        unfolded_from(self.wrap(), p.y, y, height),
+                    )
+                }))
+            })
+        })
     }
 }
 
-/// The triangle's extent in x between two heights y.
-fn extent(corners: [DVec2; 3], low: f64, high: f64) -> Option<[f64; 2]> {
-    let mut extent: Option<[f64; 2]> = None;
-    let mut include = |x: f64| extent = Some(extent.map_or([x, x], |[a, b]| [a.min(x), b.max(x)]));
-    for (p, q) in [
-        (corners[0], corners[1]),
-        (corners[1], corners[2]),
-        (corners[2], corners[0]),
-    ] {
-        if p.y >= low && p.y <= high {
-            include(p.x);
+/// The repeats of a side of `n` texels that coordinates `low..=high` meet.
+fn repeats(wrap: Wrap, low: f64, high: f64, n: usize) -> std::ops::RangeInclusive<i64> {
+    match wrap {
+        Wrap::Clamp => 0..=0,
+        Wrap::Repeat | Wrap::Mirror => {
+            (low / n as f64).floor() as i64..=(high / n as f64).floor() as i64
         }
-        for y in [low, high] {
-            let part = (y - p.y) / (q.y - p.y);
-            if (0.0..=1.0).contains(&part) {
-                include(p.x + part * (q.x - p.x));
+    }
+}
+
+/// Coordinate `x` in the frame of the stored map that repeat `k` is a copy of.
+fn unfolded_from(wrap: Wrap, x: f64, k: i64, n: usize) -> f64 {
+    let x = x - k as f64 * n as f64;
+    if wrap == Wrap::Mirror && k.rem_euclid(2) == 1 {
+        n as f64 - 1.0 - x
+    } else {
+        x
+    }
+}
+
+fn bounds(corners: [DVec2; 3]) -> (DVec2, DVec2) {
+    let first = (corners[0], corners[0]);
+    corners
+        .iter()
+        .fold(first, |(a, b), &p| (a.min(p), b.max(p)))
+}
+
+/// The search for a range.
+struct Found<'m> {
+    map: &'m DisplacementMap,
+    /// As stored.
+    range: Option<(f32, f32)>,
+    /// Blocks to look into, and those of the next level.
+    blocks: Vec<(usize, usize)>,
+    next: Vec<(usize, usize)>,
+}
+
+impl<'m> Found<'m> {
+    fn new(map: &'m DisplacementMap) -> Self {
+        Self {
+            map,
+            range: None,
+            blocks: Vec::new(),
+            next: Vec::new(),
+        }
+    }
+
+    fn include(&mut self, (low, high): (f32, f32)) {
+        let (a, b) = self.range.unwrap_or((low, high));
+        self.range = Some((a.min(low), b.max(high)));
+    }
+
+    fn has(&self, (low, high): (f32, f32)) -> bool {
+        self.range.is_some_and(|(a, b)| a <= low && high <= b)
+    }
+
+    fn include_texel(&mut self, i: usize, j: usize) {
+        let h = self.map.texels().get(j * self.map.stride() + i);
+        self.include((h, h));
+    }
+
+    /// Includes the stored texels in `region`, from coarse blocks to fine ones: on each level first what is taken whole,
+    /// so that less of the rest is worth a look.
+    fn take(&mut self, region: &Region) {
+        let levels = self.map.pyramid().levels();
+        let Some(mut top) = self.start(region) else {
+            return;
+        };
+        loop {
+            let level = &levels[top];
+            let mut blocks = std::mem::take(&mut self.blocks);
+            blocks.retain(|&block| self.is_undecided(region, level, block));
+            blocks.retain(|&(i, j)| !self.has(level.get(i, j)));
+            if top == 0 {
+                for &(i, j) in &blocks {
+                    self.take_texels(region, level, (i, j));
+                }
+                blocks.clear();
+                self.blocks = blocks;
+                return;
+            }
+            top -= 1;
+            let finer = &levels[top];
+            self.next.clear();
+            for (i, j) in blocks.drain(..) {
+                for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)].map(|d| (2 * i + d.0, 2 * j + d.1)) {
+                    if i < finer.width() && j < finer.height() {
+                        self.next.push((i, j));
+                    }
+                }
+            }
+            self.blocks = std::mem::replace(&mut self.next, blocks);
+        }
+    }
+
+    /// Lists the blocks under the region's bounds on the finest level where they are few; returns the level. `None`
+    /// for a region beside the map.
+    fn start(&mut self, region: &Region) -> Option<usize> {
+        let (width, height) = self.map.size();
+        let last = DVec2::new(width as f64 - 1.0, height as f64 - 1.0);
+        let (low, high) = (
+            region.low.ceil().max(DVec2::ZERO),
+            region.high.floor().min(last),
+        );
+        if !low.cmple(high).all() {
+            return None;
+        }
+        let levels = self.map.pyramid().levels();
+        let longest = (high - low).max_element() as usize;
+        let fits = |level: &Level| longest >> level.shift() <= 1;
+        let top = levels.iter().position(fits).unwrap_or(levels.len() - 1);
+        let block = |x: f64| x as usize >> levels[top].shift();
+        self.blocks.clear();
+        for j in block(low.y)..=block(high.y) {
+            (self.blocks).extend((block(low.x)..=block(high.x)).map(|i| (i, j)));
+        }
+        Some(top)
+    }
+
+    /// Takes the block's entry if its texels are all in the region; otherwise tells whether some can be.
+    fn is_undecided(&mut self, region: &Region, level: &Level, (i, j): (usize, usize)) -> bool {
+        let (width, height) = self.map.size();
+        let side = 1 << level.shift();
+        let low = DVec2::new((i * side) as f64, (j * side) as f64);
+        match region.meets(low, low + (side - 1) as f64) {
+            Meets::Outside => return false,
+            Meets::Partly => return true,
+            Meets::Inside => {}
+        }
+        // Entries reach over two blocks; across the map's edge only the finest are exact.
+        let reach = (2 * side) as f64;
+        let exact = level.shift() == self.map.pyramid().levels()[0].shift()
+            || (low.x + reach < width as f64 && low.y + reach < height as f64);
+        if exact && region.meets(low, low + reach) == Meets::Inside {
+            self.include(level.get(i, j));
+            return false;
+        }
+        true
+    }
+
+    /// Texel by texel, unless that is no use any more.
+    fn take_texels(&mut self, region: &Region, level: &Level, (i, j): (usize, usize)) {
+        if self.has(level.get(i, j)) {
+            return;
+        }
+        let (width, height) = self.map.size();
+        let side = 1 << level.shift();
+        for j in j * side..height.min((j + 1) * side) {
+            for i in i * side..width.min((i + 1) * side) {
+                let texel = DVec2::new(i as f64, j as f64);
+                if region.meets(texel, texel) != Meets::Outside {
+                    self.include_texel(i, j);
+                }
             }
         }
     }
-    extent
-}
 
-/// Texels `first..=last` of a row of `n` as runs of stored texels.
-fn for_runs(wrap: Wrap, first: i64, last: i64, n: usize, mut run: impl FnMut(usize, usize)) {
-    if wrap == Wrap::Clamp {
-        return run(wrap.texel(first, n), wrap.texel(last, n));
-    }
-    if last - first >= n as i64 {
-        return run(0, n - 1);
-    }
-    let mut from = first;
-    while from <= last {
-        // Up to the next edge of the map: folding keeps such a stretch in one piece, maybe backwards.
-        let to = last.min((from.div_euclid(n as i64) + 1) * n as i64 - 1);
-        let (a, b) = (wrap.texel(from, n), wrap.texel(to, n));
-        run(a.min(b), a.max(b));
-        from = to + 1;
+    /// What a triangle that leaves a clamped map reads beyond its edges: edge texels.
+    fn take_edges(&mut self, corners: [DVec2; 3]) {
+        let (width, height) = self.map.size();
+        let (last_column, last_row) = ((width - 1) as f64, (height - 1) as f64);
+        let (low, high) = bounds(corners);
+        let reach = 1.0 + SLACK;
+        let columns = |[from, to]: [f64; 2]| {
+            let (first, last) = ((from - SLACK).floor(), (to + SLACK).floor() + 1.0);
+            [first, last].map(|x| x.clamp(0.0, last_column) as usize)
+        };
+        // Rows below the first one read it, rows above the last one that.
+        for (from, to, j) in [
+            (f64::NEG_INFINITY, -1.0 + reach, 0),
+            (last_row + 1.0 - reach, f64::INFINITY, height - 1),
+        ] {
+            if let Some([first, last]) = extent(corners, from, to).map(columns) {
+                (first..=last).for_each(|i| self.include_texel(i, j));
+            }
+        }
+        if low.x - reach >= 0.0 && high.x + reach <= last_column {
+            return;
+        }
+        let rows = [low.y - reach, high.y + reach].map(|y| y.clamp(0.0, last_row));
+        for j in rows[0] as usize..=rows[1] as usize {
+            let Some([from, to]) = extent(corners, j as f64 - reach, j as f64 + reach) else {
+                continue;
+            };
+            if (from - SLACK).floor() < 0.0 {
+                self.include_texel(0, j);
+            }
+            if (to + SLACK).floor() + 1.0 > last_column {
+                self.include_texel(width - 1, j);
+            }
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn no_sample_inside_is_outside_the_range(
-            corners in prop::array::uniform6(-20.0f64..20.0), b in prop::array::uniform2(0.0f64..1.0), mode in 0..3,
-        ) {
-            let wrap = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror][mode as usize];
-            let heights = (0..30 * 41).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 9) as u16).collect();
-            let map = DisplacementMap::new(30, 41, Texels::U16(heights), wrap).unwrap();
-            let at = |i: usize| DVec2::new(corners[2 * i], corners[2 * i + 1]);
-            let (u, v) = if b[0] + b[1] > 1.0 { (1.0 - b[0], 1.0 - b[1]) } else { (b[0], b[1]) };
-            let p = at(0) + u * (at(1) - at(0)) + v * (at(2) - at(0));
-            let (low, high) = map.range_over([at(0), at(1), at(2)]);
-            let height = map.sample(p).height as f32;
-            prop_assert!(height >= low - 1e-6 && height <= high + 1e-6, "{height} outside {low} .. {high}");
-        }
-    }
-
-    #[test]
-    fn the_range_is_tight() {
-        let mut heights = vec![0; 100 * 100];
-        heights[50 * 100 + 50] = 65535;
-        let map = DisplacementMap::new(100, 100, Texels::U16(heights), Wrap::Repeat).unwrap();
-        let triangle = |x: f64, y: f64| {
-            [
-                DVec2::new(x, y),
-                DVec2::new(x + 9.0, y),
-                DVec2::new(x, y + 9.0),
-            ]
-        };
-        assert_eq!(map.range_over(triangle(45.0, 45.0)), (0.0, 1.0));
-        assert_eq!(map.range_over(triangle(445.0, -55.0)), (0.0, 1.0));
-        assert_eq!(map.range_over(triangle(52.0, 45.0)), (0.0, 0.0));
-        assert_eq!(map.range_over(triangle(41.0, 51.5)), (0.0, 0.0));
-    }
-}
+mod tests;

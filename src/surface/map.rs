@@ -6,10 +6,13 @@
 //! Inside the program positions are *texel coordinates*: x = s * width - 0.5, so that texel centres are the
 //! integers and cell (i, j) is the square between the centres of texels i, i+1 and j, j+1.
 
+use std::sync::Mutex;
+
 use glam::{DVec2, Vec2};
 use thiserror::Error;
 
-use super::Wrap;
+use super::texels::StoredTexels;
+use super::{Pyramid, TexelKind, TexelRect, Texels, Wrap};
 
 /// Why a map was refused. The loader that met it adds the file's name.
 #[derive(Debug, Error, PartialEq)]
@@ -42,6 +45,35 @@ pub enum MapError {
         /// Texels given.
         found: usize,
     },
+    /// A rectangle of texels without any.
+    #[error("the rectangle is {0}; at least 1x1 texels are needed")]
+    EmptyRect(TexelRect),
+    /// A rectangle that is not wholly inside the map.
+    #[error("the rectangle {rect} is not inside the map of {width}x{height} texels")]
+    RectOutside {
+        /// What was asked for.
+        rect: TexelRect,
+        /// Texels across the map.
+        width: usize,
+        /// Texels up the map.
+        height: usize,
+    },
+    /// The number of texels of an edit is not that of its rectangle.
+    #[error("the rectangle is {rect}, but {found} texels were given")]
+    WrongRectLength {
+        /// What is to be edited.
+        rect: TexelRect,
+        /// Texels given.
+        found: usize,
+    },
+    /// Texels of another precision than the map's.
+    #[error("the texels are {found}, but the map's are {expected}")]
+    WrongKind {
+        /// The precision of what was given.
+        found: TexelKind,
+        /// The precision of the map.
+        expected: TexelKind,
+    },
     /// A NaN or infinite height.
     #[error(
         "texel ({x}, {y}) of the map (from the bottom left) is {value}; heights must be finite"
@@ -56,61 +88,6 @@ pub enum MapError {
     },
 }
 
-/// Heights in the precision they came in, bottom row first.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Texels {
-    /// h = texel / 255.
-    U8(Vec<u8>),
-    /// h = texel / 65535.
-    U16(Vec<u16>),
-    /// h as stored (half-float maps are widened).
-    F32(Vec<f32>),
-}
-
-impl Texels {
-    /// Number of texels.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::U8(t) => t.len(),
-            Self::U16(t) => t.len(),
-            Self::F32(t) => t.len(),
-        }
-    }
-
-    /// True for no texels.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Bytes per texel.
-    pub fn texel_bytes(&self) -> usize {
-        match self {
-            Self::U8(_) => 1,
-            Self::U16(_) => 2,
-            Self::F32(_) => 4,
-        }
-    }
-
-    /// The stored value that means height 1.
-    pub fn unit(&self) -> f32 {
-        match self {
-            Self::U8(_) => 255.0,
-            Self::U16(_) => 65535.0,
-            Self::F32(_) => 1.0,
-        }
-    }
-
-    /// Texel `index` as stored.
-    #[inline(always)]
-    fn raw(&self, index: usize) -> f32 {
-        match self {
-            Self::U8(t) => f32::from(t[index]),
-            Self::U16(t) => f32::from(t[index]),
-            Self::F32(t) => t[index],
-        }
-    }
-}
-
 /// A bilinear sample in texel coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightSample {
@@ -120,20 +97,19 @@ pub struct HeightSample {
     pub gradient: DVec2,
 }
 
-/// A displacement map, ready to be sampled.
-#[derive(Clone, Debug)]
+/// A displacement map, ready to be sampled, and the min/max pyramid over it.
+///
+/// It is shared between surfaces and read from many threads; [`DisplacementMap::update`] edits it in place.
+#[derive(Debug)]
 pub struct DisplacementMap {
-    width: usize,
-    height: usize,
-    wrap: Wrap,
-    /// (width + 1) x (height + 1): one more column and row, as the wrap mode continues them, so that the four
-    /// corners of every cell lie at fixed offsets; then `TAIL` more, so that a 32-bit gather of the last 8-bit
-    /// texel stays inside.
-    texels: Texels,
-    range: (f32, f32),
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) wrap: Wrap,
+    pub(super) texels: StoredTexels,
+    pub(super) pyramid: Pyramid,
+    /// Held while editing: an entry of the pyramid depends on texels of several edits.
+    pub(super) editing: Mutex<()>,
 }
-
-const TAIL: usize = 4;
 
 impl DisplacementMap {
     /// Largest width and height: texel indices fit 32 bits and an f32 texel coordinate still resolves 1/256.
@@ -158,27 +134,20 @@ impl DisplacementMap {
                 found: texels.len(),
             });
         }
-        if let Texels::F32(t) = &texels
-            && let Some(i) = t.iter().position(|h| !h.is_finite())
-        {
+        if let Some((i, value)) = texels.not_finite() {
             return Err(MapError::NotFinite {
                 x: i % width,
                 y: i / width,
-                value: t[i],
+                value,
             });
         }
-        let range = range(&texels);
-        let texels = match texels {
-            Texels::U8(t) => Texels::U8(padded(&t, width, height, wrap)),
-            Texels::U16(t) => Texels::U16(padded(&t, width, height, wrap)),
-            Texels::F32(t) => Texels::F32(padded(&t, width, height, wrap)),
-        };
         Ok(Self {
             width,
             height,
             wrap,
-            texels,
-            range,
+            pyramid: Pyramid::new(&texels, width, height, wrap),
+            texels: StoredTexels::new(texels, width, height, wrap),
+            editing: Mutex::new(()),
         })
     }
 
@@ -194,22 +163,38 @@ impl DisplacementMap {
 
     /// Smallest and largest height.
     pub fn range(&self) -> (f32, f32) {
-        self.range
+        let (low, high) = self.pyramid.range();
+        (low / self.unit(), high / self.unit())
+    }
+
+    /// The precision of the texels.
+    pub fn kind(&self) -> TexelKind {
+        self.texels.kind()
+    }
+
+    /// The stored value that means height 1: 255, 65535, or 1 for floats.
+    pub fn unit(&self) -> f32 {
+        self.kind().unit()
+    }
+
+    /// The smallest and largest texels of blocks of the map.
+    pub fn pyramid(&self) -> &Pyramid {
+        &self.pyramid
     }
 
     /// The texels as stored, in rows of [`Self::stride`].
-    pub fn texels(&self) -> &Texels {
+    pub(crate) fn texels(&self) -> &StoredTexels {
         &self.texels
     }
 
     /// Stored texels per row.
-    pub fn stride(&self) -> usize {
+    pub(crate) fn stride(&self) -> usize {
         self.width + 1
     }
 
-    /// Bytes held.
+    /// Bytes held, texels and pyramid.
     pub fn bytes(&self) -> usize {
-        self.texels.len() * self.texels.texel_bytes()
+        self.texels.bytes() + self.pyramid.bytes()
     }
 
     /// Height at texture coordinates `st`, bilinear.
@@ -231,7 +216,7 @@ impl DisplacementMap {
         let (h00, h10, h01, h11) = (corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1));
         let (bottom, top) = (h00 + fx * (h10 - h00), h01 + fx * (h11 - h01));
         let dx = (h10 - h00) + fy * ((h11 - h01) - (h10 - h00));
-        let unit = 1.0 / f64::from(self.texels.unit());
+        let unit = 1.0 / f64::from(self.unit());
         HeightSample {
             height: unit * (bottom + fy * (top - bottom)),
             gradient: unit * DVec2::new(sx * dx, sy * (top - bottom)),
@@ -252,7 +237,7 @@ impl DisplacementMap {
     /// Stored texel of column `i` in 0..=width and row `j` in 0..=height.
     #[inline(always)]
     fn raw(&self, i: usize, j: usize) -> f32 {
-        self.texels.raw(j * self.stride() + i)
+        self.texels.get(j * self.stride() + i)
     }
 
     /// The cell of coordinate `x` along a side of `n` texels, the position in it, and how fast it moves with x.
@@ -264,119 +249,5 @@ impl DisplacementMap {
     }
 }
 
-fn range(texels: &Texels) -> (f32, f32) {
-    fn integer<T: Copy + Ord + Into<f32>>(t: &[T], unit: f32) -> (f32, f32) {
-        let (min, max) = t
-            .iter()
-            .fold((t[0], t[0]), |(a, b), &h| (a.min(h), b.max(h)));
-        (min.into() / unit, max.into() / unit)
-    }
-    match texels {
-        Texels::U8(t) => integer(t, texels.unit()),
-        Texels::U16(t) => integer(t, texels.unit()),
-        Texels::F32(t) => t
-            .iter()
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), &h| {
-                (a.min(h), b.max(h))
-            }),
-    }
-}
-
-fn padded<T: Copy + Default>(t: &[T], width: usize, height: usize, wrap: Wrap) -> Vec<T> {
-    let beyond = |n: usize| if wrap == Wrap::Repeat { 0 } else { n - 1 };
-    let mut out = Vec::with_capacity((width + 1) * (height + 1) + TAIL);
-    for j in (0..height).chain([beyond(height)]) {
-        let row = &t[j * width..(j + 1) * width];
-        out.extend_from_slice(row);
-        out.push(row[beyond(width)]);
-    }
-    out.resize(out.len() + TAIL, T::default());
-    out
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn ramp(wrap: Wrap) -> DisplacementMap {
-        DisplacementMap::new(4, 2, Texels::U16((0..8).map(|i| i * 1000).collect()), wrap).unwrap()
-    }
-
-    #[test]
-    fn texel_centres_read_back_exactly() {
-        for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
-            let map = ramp(wrap);
-            for j in 0..2 {
-                for i in 0..4 {
-                    let st = Vec2::new((i as f32 + 0.5) / 4.0, (j as f32 + 0.5) / 2.0);
-                    assert_eq!(
-                        map.height(st),
-                        (1000 * (i + 4 * j)) as f32 / 65535.0,
-                        "{wrap:?} {i} {j}"
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn wrap_modes_continue_the_map() {
-        let at = |wrap, s: f32| ramp(wrap).height(Vec2::new(s, 0.25)) * 65535.0 / 1000.0;
-        let near = |a: f32, b: f32| assert!((a - b).abs() < 1e-4, "{a} {b}");
-        near(at(Wrap::Repeat, 0.0), 1.5); // half-way between the last and the first texel
-        near(at(Wrap::Repeat, 1.375), 1.0);
-        near(at(Wrap::Repeat, -0.125), 3.0);
-        near(at(Wrap::Clamp, -3.0), 0.0);
-        near(at(Wrap::Clamp, 1.7), 3.0);
-        near(at(Wrap::Mirror, -0.375), 1.0);
-        near(at(Wrap::Mirror, 1.375), 2.0);
-        near(at(Wrap::Mirror, 2.375), 1.0);
-    }
-
-    #[test]
-    fn the_gradient_is_the_difference_quotient() {
-        for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
-            let map = ramp(wrap);
-            for k in -40..40 {
-                let p = DVec2::new(0.371 * f64::from(k) + 0.0123, 0.233 * f64::from(k) + 0.0217);
-                let e = 1e-5;
-                let difference =
-                    |d: DVec2| (map.sample(p + d).height - map.sample(p - d).height) / (2.0 * e);
-                let g = map.sample(p).gradient;
-                assert!(
-                    (g.x - difference(DVec2::X * e)).abs() < 1e-9,
-                    "{wrap:?} {p}"
-                );
-                assert!(
-                    (g.y - difference(DVec2::Y * e)).abs() < 1e-9,
-                    "{wrap:?} {p}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn bad_maps_are_refused() {
-        let new = |w, h, t| DisplacementMap::new(w, h, t, Wrap::Repeat).map(|_| ());
-        assert_eq!(
-            new(0, 3, Texels::U8(vec![])),
-            Err(MapError::Empty {
-                width: 0,
-                height: 3
-            })
-        );
-        assert!(matches!(
-            new(2, 2, Texels::U8(vec![0; 3])),
-            Err(MapError::WrongLength { found: 3, .. })
-        ));
-        assert!(matches!(
-            new(40000, 1, Texels::U8(vec![0; 40000])),
-            Err(MapError::TooLarge { .. })
-        ));
-        let nan = Texels::F32(vec![0.0, 0.0, 0.0, f32::NAN]);
-        assert!(matches!(
-            new(2, 2, nan),
-            Err(MapError::NotFinite { x: 1, y: 1, .. })
-        ));
-    }
-}
+mod tests;

@@ -11,18 +11,26 @@
 //! This room knows no prism, no Embree, no picture and no thread pool.
 
 mod displaced;
+mod edit;
 mod footprint;
 mod map;
 mod mesh;
 mod normals;
 mod patch;
 mod projection;
+mod pyramid;
+mod texels;
 mod uv;
 
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
-pub use map::{DisplacementMap, HeightSample, MapError, Texels};
+pub use edit::{TexelRect, Update};
+pub use map::{DisplacementMap, HeightSample, MapError};
 pub use mesh::{BaseMesh, MeshBuilder, MeshError, MeshReport, NormalMode};
 pub(crate) use patch::solve;
 pub use patch::{Patch, PatchPoint};
 pub use projection::Projection;
+pub(crate) use pyramid::Entries;
+pub use pyramid::{Level, Pyramid};
+pub(crate) use texels::{StoredTexels, Texel};
+pub use texels::{TexelKind, Texels};
 pub use uv::{UvTransform, Wrap};

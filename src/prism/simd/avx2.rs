@@ -11,8 +11,8 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 use std::sync::atomic::AtomicU32;
 
-use super::{Grid, LANES, Lanes};
-use crate::surface::Texels;
+use super::{Grid, LANES, Lanes, Task};
+use crate::surface::{Entries, Level, StoredTexels};
 
 #[derive(Clone, Copy)]
 pub struct Avx2(__m256);
@@ -37,6 +37,17 @@ lanewise!(Div, div, _mm256_div_ps);
 
 impl Lanes for Avx2 {
     type Quad = super::avx2_quad::Avx2Quad;
+
+    #[inline(always)]
+    fn outline<T: Task<Self>>(task: T) -> T::Output {
+        #[inline(never)]
+        #[target_feature(enable = "avx2,fma")]
+        fn stamped<T: Task<Avx2>>(task: T) -> T::Output {
+            task.run()
+        }
+        // SAFETY: called in AVX2 kernels only (module documentation).
+        unsafe { stamped(task) }
+    }
 
     #[inline(always)]
     fn splat(x: f32) -> Self {
@@ -145,18 +156,32 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn block_ranges(level: &super::TmpLevel, i: Self, j: Self) -> [Self; 2] {
-        let inside = |i: Self, n: usize| i.max(Self::splat(0.0)).min(Self::splat((n - 1) as f32));
-        let (i, j) = (inside(i, level.width), inside(j, level.height));
-        // SAFETY: AVX2 is there; index in bounds by the lines above.
+    fn block_ranges(level: &Level, i: Self, j: Self) -> [Self; 2] {
+        // Moved inside here, as in `cell_corners`.
+        let last = [(level.width() - 1) as f32, (level.height() - 1) as f32];
+        let i = i.max(Self::splat(0.0)).min(Self::splat(last[0]));
+        let j = j.max(Self::splat(0.0)).min(Self::splat(last[1]));
+        // SAFETY: AVX2 is there. 0 <= i < width and 0 <= j < height, so index is that of a stored pair; the 32-bit loads of
+        // 16-bit pairs end inside the pairs that `Entries` keeps after the last one. Edits meanwhile: as in `cell_corners`.
         unsafe {
-            let stride = _mm256_set1_epi32(level.width as i32);
+            let stride = _mm256_set1_epi32(level.width() as i32);
             let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
             let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
-            let (low, high) = pair::<16>(_mm256_i32gather_epi32::<4>(
-                level.entries.as_ptr().cast(),
-                index,
-            ));
+            let (low, high) = match level.entries() {
+                Entries::U8(e) => {
+                    pair::<8>(_mm256_i32gather_epi32::<2>(e.as_ptr().cast(), index))
+                }
+                Entries::U16(e) => {
+                    pair::<16>(_mm256_i32gather_epi32::<4>(e.as_ptr().cast(), index))
+                }
+                Entries::F32(e) => {
+                    let low = e.as_ptr().cast::<f32>();
+                    (
+                        Self(_mm256_i32gather_ps::<8>(low, index)),
+                        Self(_mm256_i32gather_ps::<8>(low.add(1), index)),
+                    )
+                }
+            };
             [low, high]
         }
     }
@@ -170,27 +195,31 @@ impl Lanes for Avx2 {
         // SAFETY: AVX2 is there. 0 <= i <= width - 1 and 0 <= j <= height - 1, so index + stride + 1 is at most
         // (height + 1) * (width + 1) - 1, the last stored texel; it fits i32 because sides are at most
         // `DisplacementMap::MAX_SIDE`. The 32-bit loads of narrower texels start at such a texel and end inside
-        // the four texels that `DisplacementMap` stores after the last one.
+        // the four texels that `StoredTexels` keeps after the last one.
+        // An edit on another thread may store to these atomics meanwhile. They are atomics, so the compiler takes no
+        // value for constant, and the gather reads each texel with one plain load, as a relaxed load does: it is
+        // the old texel or the new one.
         unsafe {
             let stride = _mm256_set1_epi32(grid.stride as i32);
             let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
             let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
             let above = _mm256_add_epi32(index, stride);
             match grid.texels {
-                Texels::U8(t) => {
-                    let texels = t.as_ptr().cast();
+                StoredTexels::U8(t) => {
+                    let texels = t.as_ptr().cast::<i32>();
                     let (h00, h10) = pair::<8>(_mm256_i32gather_epi32::<1>(texels, index));
                     let (h01, h11) = pair::<8>(_mm256_i32gather_epi32::<1>(texels, above));
                     [h00, h10, h01, h11]
                 }
-                Texels::U16(t) => {
-                    let texels = t.as_ptr().cast();
+                StoredTexels::U16(t) => {
+                    let texels = t.as_ptr().cast::<i32>();
                     let (h00, h10) = pair::<16>(_mm256_i32gather_epi32::<2>(texels, index));
                     let (h01, h11) = pair::<16>(_mm256_i32gather_epi32::<2>(texels, above));
                     [h00, h10, h01, h11]
                 }
-                Texels::F32(t) => {
-                    let (left, right) = (t.as_ptr(), t.as_ptr().add(1));
+                StoredTexels::F32(t) => {
+                    let left = t.as_ptr().cast::<f32>();
+                    let right = left.add(1);
                     [
                         Self(_mm256_i32gather_ps::<4>(left, index)),
                         Self(_mm256_i32gather_ps::<4>(right, index)),

@@ -16,7 +16,7 @@ mod avx2_quad;
 use std::ops::{Add, Div, Mul, Sub};
 use std::sync::atomic::AtomicU32;
 
-use crate::surface::{DisplacementMap, Texels, Wrap};
+use crate::surface::{DisplacementMap, Level, StoredTexels, Wrap};
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -66,12 +66,23 @@ impl SimdLevel {
 /// Number of lanes.
 pub(crate) const LANES: usize = 8;
 
+/// A part of a kernel that may stand in a function of its own.
+pub(crate) trait Task<L> {
+    /// What it gives.
+    type Output;
+    /// Must be `inline(always)`, to be compiled for the instruction set of who runs it.
+    fn run(self) -> Self::Output;
+}
+
 /// Eight f32 values: the least that the kernels need.
 pub(crate) trait Lanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// The f64 lanes that go with these.
     type Quad: Quad;
+
+    /// Runs a task in a function of its own, stamped for the instruction set: for what would bloat its callers.
+    fn outline<T: Task<Self>>(task: T) -> T::Output;
 
     fn splat(x: f32) -> Self;
     fn from_array(x: [f32; LANES]) -> Self;
@@ -99,71 +110,21 @@ pub(crate) trait Lanes:
     fn sign_mask(self) -> u32;
     /// Smallest and largest stored texel of the blocks (i, j) of a level, integers in float lanes. Blocks outside the
     /// level, and NaN, are moved inside first.
-    fn block_ranges(level: &TmpLevel, i: Self, j: Self) -> [Self; 2];
+    fn block_ranges(level: &Level, i: Self, j: Self) -> [Self; 2];
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), integers in float lanes.
     /// Cells outside the grid, and NaN, are moved inside first.
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4];
 }
 
-pub struct TmpLevel {
-    pub shift: u32,
-    pub width: usize,
-    pub height: usize,
-    pub entries: Vec<u32>,
-}
-
-pub fn tmp_levels(map: &DisplacementMap) -> Vec<TmpLevel> {
-    let (w, h) = map.size();
-    let Texels::U16(t) = map.texels() else { return vec![] };
-    let mut levels = vec![];
-    let mut shift = 2;
-    loop {
-        let b = 1usize << shift;
-        let (lw, lh) = (w.div_ceil(b), h.div_ceil(b));
-        let mut entries = vec![0u32; lw * lh + 4];
-        for j in 0..lh {
-            for i in 0..lw {
-                let (mut lo, mut hi) = (u16::MAX, 0u16);
-                if shift == 2 {
-                    for y in 0..=2 * b {
-                        for x in 0..=2 * b {
-                            let tx = map.wrap().texel((i * b + x) as i64, w);
-                            let ty = map.wrap().texel((j * b + y) as i64, h);
-                            let v = t[ty * map.stride() + tx];
-                            lo = lo.min(v);
-                            hi = hi.max(v);
-                        }
-                    }
-                } else {
-                    let prev: &TmpLevel = levels.last().unwrap();
-                    for (di, dj) in [(0, 0), (2, 0), (0, 2), (2, 2)] {
-                        let x = (2 * i + di) % prev.width;
-                        let y = (2 * j + dj) % prev.height;
-                        let e = prev.entries[y * prev.width + x];
-                        lo = lo.min(e as u16);
-                        hi = hi.max((e >> 16) as u16);
-                    }
-                }
-                entries[j * lw + i] = lo as u32 | (hi as u32) << 16;
-            }
-        }
-        levels.push(TmpLevel { shift, width: lw, height: lh, entries });
-        if lw == 1 && lh == 1 {
-            return levels;
-        }
-        shift += 1;
-    }
-}
-
 /// A displacement map as the kernels see it.
 #[derive(Clone, Copy)]
 pub(crate) struct Grid<'m> {
-    texels: &'m Texels,
+    texels: &'m StoredTexels,
     stride: usize,
     wrap: Wrap,
     /// Texels across and up.
     size: [f32; 2],
-    levels: &'m [TmpLevel],
+    levels: &'m [Level],
 }
 
 impl<'m> Grid<'m> {
@@ -175,19 +136,14 @@ impl<'m> Grid<'m> {
             stride: map.stride(),
             wrap: map.wrap(),
             size: [width as f32, height as f32],
-            levels: &[],
+            levels: map.pyramid().levels(),
         }
-    }
-
-    #[inline(always)]
-    pub fn with_levels(self, levels: &'m [TmpLevel]) -> Self {
-        Self { levels, ..self }
     }
 
     /// The stored value that means height 1.
     #[inline(always)]
     pub fn unit(&self) -> f32 {
-        self.texels.unit()
+        self.texels.kind().unit()
     }
 
     /// Whole texel coordinates within one period of the map, or near it where it goes on for ever.
@@ -212,17 +168,15 @@ impl<'m> Grid<'m> {
     pub fn level(&self, size: f32) -> usize {
         // Blocks of level l are 4 << l wide.
         let bits = 32 - (size as u32).leading_zeros() as usize;
-        bits.saturating_sub(2).min(self.levels.len().saturating_sub(1))
+        bits.saturating_sub(2).min(self.levels.len() - 1)
     }
 
     /// Smallest and largest stored texel around boxes of texel coordinates ([low, high] in x and in y) no larger than a
     /// block of the level.
     #[inline(always)]
     pub fn block_range<L: Lanes>(&self, level: usize, x: [L; 2], y: [L; 2]) -> [L; 2] {
-        let Some(level) = self.levels.get(level) else {
-            return [L::splat(0.0), L::splat(self.unit())];
-        };
-        let per_block = L::splat(1.0 / (1u32 << level.shift) as f32);
+        let level = &self.levels[level];
+        let per_block = L::splat(1.0 / (1u32 << level.shift()) as f32);
         let i = (self.first(x, self.size[0]) * per_block).floor();
         let j = (self.first(y, self.size[1]) * per_block).floor();
         L::block_ranges(level, i, j)
@@ -284,7 +238,7 @@ impl<'m> Grid<'m> {
         }
     }
 
-    /// Stored height (see [`Texels::unit`]) at texel coordinates, bilinear.
+    /// Stored height (see [`DisplacementMap::unit`]) at texel coordinates, bilinear.
     #[inline(always)]
     pub fn sample<L: Lanes>(&self, x: L, y: L) -> L {
         let (x, y) = (self.fold(x, self.size[0]), self.fold(y, self.size[1]));
@@ -336,6 +290,7 @@ fn periodic<L: Lanes>(i: L, n: L) -> L {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::Texels;
     use glam::DVec2;
 
     fn maps() -> Vec<DisplacementMap> {
@@ -369,7 +324,7 @@ mod tests {
                 let got = grid.sample(L::from_array(x), L::from_array(y)).to_array();
                 for l in 0..LANES {
                     let want = map.sample(DVec2::new(x[l].into(), y[l].into())).height as f32;
-                    let unit = map.texels().unit();
+                    let unit = map.unit();
                     assert!(
                         (got[l] / unit - want).abs() < 1e-4 * want.abs().max(1.0),
                         "{:?} {}",

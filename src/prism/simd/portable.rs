@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec4;
 
-use super::{Grid, LANES, Lanes};
-use crate::surface::Texels;
+use super::{Grid, LANES, Lanes, Task};
+use crate::surface::{Level, StoredTexels, Texel};
 
 #[derive(Clone, Copy)]
 pub struct Portable(Vec4, Vec4);
@@ -30,6 +30,11 @@ lanewise!(Div, div);
 
 impl Lanes for Portable {
     type Quad = super::quad::PortableQuad;
+
+    #[inline(never)]
+    fn outline<T: Task<Self>>(task: T) -> T::Output {
+        task.run()
+    }
 
     #[inline(always)]
     fn splat(x: f32) -> Self {
@@ -115,15 +120,14 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn block_ranges(level: &super::TmpLevel, i: Self, j: Self) -> [Self; 2] {
+    fn block_ranges(level: &Level, i: Self, j: Self) -> [Self; 2] {
         let (i, j) = (i.to_array(), j.to_array());
         let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
-            let i = (i[l] as usize).min(level.width - 1);
-            let j = (j[l] as usize).min(level.height - 1);
-            let e = level.entries[j * level.width + i];
-            low[l] = (e & 0xffff) as f32;
-            high[l] = (e >> 16) as f32;
+            // `as usize` turns NaN and negatives into 0.
+            let i = (i[l] as usize).min(level.width() - 1);
+            let j = (j[l] as usize).min(level.height() - 1);
+            (low[l], high[l]) = level.get(i, j);
         }
         [Self::from_array(low), Self::from_array(high)]
     }
@@ -131,20 +135,15 @@ impl Lanes for Portable {
     #[inline(always)]
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4] {
         match grid.texels {
-            Texels::U8(t) => corners(t, grid, i, j),
-            Texels::U16(t) => corners(t, grid, i, j),
-            Texels::F32(t) => corners(t, grid, i, j),
+            StoredTexels::U8(t) => corners::<u8>(t, grid, i, j),
+            StoredTexels::U16(t) => corners::<u16>(t, grid, i, j),
+            StoredTexels::F32(t) => corners::<f32>(t, grid, i, j),
         }
     }
 }
 
 #[inline(always)]
-fn corners<T: Copy + Into<f32>>(
-    t: &[T],
-    grid: &Grid<'_>,
-    i: Portable,
-    j: Portable,
-) -> [Portable; 4] {
+fn corners<T: Texel>(t: &[T::Atomic], grid: &Grid<'_>, i: Portable, j: Portable) -> [Portable; 4] {
     let [width, height] = grid.size;
     let (i, j) = (i.to_array(), j.to_array());
     let mut out = [[0.0; LANES]; 4];
@@ -157,10 +156,10 @@ fn corners<T: Copy + Into<f32>>(
         let at = j * grid.stride + i;
         // One bounds check for the pair.
         let (bottom, top) = (&t[at..at + 2], &t[at + grid.stride..at + grid.stride + 2]);
-        out[0][l] = bottom[0].into();
-        out[1][l] = bottom[1].into();
-        out[2][l] = top[0].into();
-        out[3][l] = top[1].into();
+        out[0][l] = T::load(&bottom[0]).into();
+        out[1][l] = T::load(&bottom[1]).into();
+        out[2][l] = T::load(&top[0]).into();
+        out[3][l] = T::load(&top[1]).into();
     }
     [
         Portable::from_array(out[0]),

@@ -116,15 +116,15 @@ impl Chord {
             length: length.to_array(),
             f: [f0.to_array(), f1.to_array(), f2.to_array()],
         };
-        self.report(possible, &lanes, curve, signs);
+        self.report::<L>(possible, &lanes, curve, signs);
     }
 
     #[inline(always)]
-    fn report<Q: crate::prism::simd::Quad>(
+    fn report<L: Lanes>(
         &self,
         mut possible: u32,
         lanes: &Lane,
-        curve: &Curve<Q>,
+        curve: &Curve<L::Quad>,
         signs: &mut Signs<'_>,
     ) {
         let [s0, s1] = self.s.map(f64::from);
@@ -138,7 +138,7 @@ impl Chord {
             let known = |f: f32| (f.abs() > self.off).then_some(f > 0.0);
             let (before, after) = (known(f0), known(end));
             let certain = !self.cut && before.is_some() && after.is_some();
-            signs.point(curve, s(start), before, s(start), false);
+            signs.point::<L>(curve, s(start), before, s(start), false);
             if signs.is_done() {
                 return;
             }
@@ -146,13 +146,13 @@ impl Chord {
             if turn > 0.0 && turn < 1.0 && !(certain && before != after) {
                 let at = f0 + turn * (f1 + turn * f2);
                 let root = start + length * first_root(f0, f1, f2);
-                signs.point(curve, s(start + turn * length), known(at), s(root), false);
+                signs.point::<L>(curve, s(start + turn * length), known(at), s(root), false);
                 if signs.is_done() {
                     return;
                 }
             }
             let root = start + length * last_root(f0, f1, f2);
-            signs.point(curve, s(start + length), after, s(root), certain);
+            signs.point::<L>(curve, s(start + length), after, s(root), certain);
             if signs.is_done() {
                 return;
             }

@@ -18,8 +18,9 @@ use glam::DVec3;
 use super::polish::Root;
 use crate::prism::curve::{Curve, View};
 use crate::prism::ray_frame::RayFrame;
-use crate::prism::simd::{Grid, Lanes};
+use crate::prism::simd::{Grid, Lanes, Quad, Task};
 use crate::surface::Patch;
+use pieces::Piece;
 use signs::Signs;
 use span::Walker;
 
@@ -63,7 +64,7 @@ pub fn search<L: Lanes>(problem: &Problem<'_>, frame: &RayFrame) -> Option<Found
     let reach = problem.offsets[0].abs().max(problem.offsets[1].abs());
     let view = View::<L::Quad>::new(problem.patch, frame, reach);
     if pieces::is_edge_on(&view, problem.offsets) {
-        return edge_on::<L>(problem, frame);
+        return L::outline(EdgeOn { problem, frame });
     }
     let stretches = view.stretches(problem.offsets);
     let mut nearest: Option<Found> = None;
@@ -101,64 +102,76 @@ fn along<L: Lanes>(
     {
         return None;
     }
-    let mut signs = Signs::new(problem);
     if pieces::is_even(curve, problem.patch) {
+        let mut signs = Signs::new(problem);
         Walker::<L>::new(problem, curve, ends).walk(&mut signs);
         return signs.nearest();
     }
-    uneven::<L>(problem, frame, curve, view, &mut signs);
-    signs.nearest()
+    L::outline(Uneven {
+        problem,
+        frame,
+        curve,
+        view,
+    })
 }
 
-/// As `along`, where A changes so much that no one span can be bounded.
-#[cold]
-#[inline(never)]
-fn uneven_pieces() {}
-
 /// As [`along`], where A changes so much that no one span can be bounded: piece by piece.
-#[inline(always)]
-fn uneven<L: Lanes>(
-    problem: &Problem<'_>,
-    frame: &RayFrame,
-    curve: &Curve<L::Quad>,
-    view: &View<L::Quad>,
-    signs: &mut Signs<'_>,
-) {
-    uneven_pieces();
-    let mut pieces = pieces::Pieces::new(curve, view);
-    while let Some(piece) = pieces.next() {
-        match piece {
-            pieces::Piece::Even(part) => {
+struct Uneven<'a, Q> {
+    problem: &'a Problem<'a>,
+    frame: &'a RayFrame,
+    curve: &'a Curve<Q>,
+    view: &'a View<Q>,
+}
+
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
+    type Output = Option<Found>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Found> {
+        let Self { problem, frame, .. } = self;
+        let mut signs = Signs::new(problem);
+        let mut pieces = pieces::Pieces::new(self.curve, self.view);
+        while let Some(piece) = pieces.next() {
+            let part = match piece {
+                Piece::Even(part) => Some(part),
+                Piece::Flat(w) => pieces::flat(problem.patch, frame, w),
+            };
+            if let Some(part) = part {
                 let ends = [part.t(0.0), part.t(1.0)];
-                Walker::<L>::new(problem, &part, ends).walk(signs);
+                Walker::<L>::new(problem, &part, ends).walk(&mut signs);
             }
-            pieces::Piece::Flat(w) => {
-                if let Some(part) = pieces::flat::<L::Quad>(problem.patch, frame, w) {
-                    let ends = [part.t(0.0), part.t(1.0)];
-                    Walker::<L>::new(problem, &part, ends).walk(signs);
-                }
+            if signs.is_done() {
+                break;
             }
         }
-        if signs.is_done() {
-            return;
-        }
+        signs.nearest()
     }
 }
 
 /// The ray lies in the planes of the prism's triangles: it meets them at the one or few w whose plane holds it.
-#[inline(always)]
-fn edge_on<L: Lanes>(problem: &Problem<'_>, frame: &RayFrame) -> Option<Found> {
-    let (heights, count) = pieces::planes_that_hold(problem.patch, frame, problem.offsets);
-    let mut nearest = None;
-    for &w in &heights[..count] {
-        if let Some(part) = pieces::flat::<L::Quad>(problem.patch, frame, w) {
-            let ends = [part.t(0.0), part.t(1.0)];
-            let mut signs = Signs::new(problem);
-            Walker::<L>::new(problem, &part, ends).walk(&mut signs);
-            nearest = nearer(nearest, signs.nearest());
+struct EdgeOn<'a> {
+    problem: &'a Problem<'a>,
+    frame: &'a RayFrame,
+}
+
+impl<L: Lanes> Task<L> for EdgeOn<'_> {
+    type Output = Option<Found>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Found> {
+        let Self { problem, frame } = self;
+        let (heights, count) = pieces::planes_that_hold(problem.patch, frame, problem.offsets);
+        let mut nearest = None;
+        for &w in &heights[..count] {
+            if let Some(part) = pieces::flat::<L::Quad>(problem.patch, frame, w) {
+                let ends = [part.t(0.0), part.t(1.0)];
+                let mut signs = Signs::new(problem);
+                Walker::<L>::new(problem, &part, ends).walk(&mut signs);
+                nearest = nearer(nearest, signs.nearest());
+            }
         }
+        nearest
     }
-    nearest
 }
 
 /// The hit on S at a crossing.

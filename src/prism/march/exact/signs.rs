@@ -6,7 +6,7 @@
 //! give or take pairs.
 
 use crate::prism::curve::{Curve, quadratic};
-use crate::prism::simd::Quad;
+use crate::prism::simd::{Lanes, Quad, Task};
 use crate::surface::Patch;
 
 use super::{Found, Problem};
@@ -63,9 +63,9 @@ impl<'a> Signs<'a> {
 
     /// The point at s, of which it may be known whether it is above; `guess` is where a crossing before it would be.
     #[inline(always)]
-    pub fn point<Q: Quad>(
+    pub fn point<L: Lanes>(
         &mut self,
-        curve: &Curve<Q>,
+        curve: &Curve<L::Quad>,
         s: f64,
         known: Option<bool>,
         guess: f64,
@@ -73,7 +73,11 @@ impl<'a> Signs<'a> {
     ) {
         let above = match known {
             Some(above) => above,
-            None => height(self.problem.patch, curve, s).g > 0.0,
+            None => L::outline(IsAbove {
+                patch: self.problem.patch,
+                curve,
+                s,
+            }),
         };
         let before = self.above.replace(above);
         let last = std::mem::replace(&mut self.last, s);
@@ -86,7 +90,13 @@ impl<'a> Signs<'a> {
             self.done = true;
             return;
         }
-        let found = crossing(self.problem.patch, curve, [last, s], guess, !above);
+        let found = L::outline(Crossing {
+            patch: self.problem.patch,
+            curve,
+            bracket: [last, s],
+            guess,
+            above: !above,
+        });
         if !self.problem.accepts(found.t) {
             return;
         }
@@ -135,6 +145,38 @@ fn height<Q: Quad>(patch: &Patch<'_>, curve: &Curve<Q>, s: f64) -> Height {
 #[inline(always)]
 fn slope<Q: Quad>(c: &[Q; 3], s: Q) -> Q {
     (c[2] + c[2]).mul_add(s, c[1])
+}
+
+struct IsAbove<'a, Q> {
+    patch: &'a Patch<'a>,
+    curve: &'a Curve<Q>,
+    s: f64,
+}
+
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for IsAbove<'_, Q> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        height(self.patch, self.curve, self.s).g > 0.0
+    }
+}
+
+struct Crossing<'a, Q> {
+    patch: &'a Patch<'a>,
+    curve: &'a Curve<Q>,
+    bracket: [f64; 2],
+    guess: f64,
+    above: bool,
+}
+
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Crossing<'_, Q> {
+    type Output = Found;
+
+    #[inline(always)]
+    fn run(self) -> Found {
+        crossing(self.patch, self.curve, self.bracket, self.guess, self.above)
+    }
 }
 
 /// The root between `from`, which is on the side `above`, and `to`, which is not: Newton's method, kept inside the

@@ -18,7 +18,7 @@ use super::Problem;
 use super::cells::{Chord, MOST_CELLS};
 use super::signs::Signs;
 use crate::prism::curve::Curve;
-use crate::prism::simd::{LANES, Lanes, Quad};
+use crate::prism::simd::{LANES, Lanes, Quad, Task};
 
 /// A chord this close to the curve, in texels, may be walked cell by cell.
 const CLOSE: f32 = 1.0 / 64.0;
@@ -70,6 +70,21 @@ struct Bounds {
     rounding: f32,
     /// Rounding of the height, stored texel units.
     height_rounding: f32,
+}
+
+/// [`Walker::walk`] in a function of its own: its callers are many, and it is long.
+struct Walk<'w, 'a, 's, L: Lanes> {
+    walker: &'w Walker<'a, L>,
+    signs: &'w mut Signs<'s>,
+}
+
+impl<L: Lanes> Task<L> for Walk<'_, '_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.walker.walk_here(self.signs);
+    }
 }
 
 /// A span in its own parameter.
@@ -151,6 +166,14 @@ impl<'a, L: Lanes> Walker<'a, L> {
     /// and f32 cannot tell many more apart, are halved instead.
     #[inline(always)]
     pub fn walk(&self, signs: &mut Signs<'_>) {
+        L::outline(Walk {
+            walker: self,
+            signs,
+        });
+    }
+
+    #[inline(always)]
+    fn walk_here(&self, signs: &mut Signs<'_>) {
         signs.begin();
         let mut stack = [[0.0f32; 2]; STACK];
         stack[0] = [0.0, 1.0];
@@ -160,12 +183,15 @@ impl<'a, L: Lanes> Walker<'a, L> {
             let [from, to] = stack[count];
             let span = self.span(from, to);
             let bounds = span.bounds(self);
-            let waiting = &mut stack;
-            if bounds.reach > WIDE {
-                self.descend::<2>(&span, &bounds, [from, to], waiting, &mut count, signs);
+            let (alive, ends) = if bounds.reach > WIDE {
+                self.children::<2>(&span, &bounds, [from, to])
             } else {
-                self.descend::<1>(&span, &bounds, [from, to], waiting, &mut count, signs);
+                self.children::<1>(&span, &bounds, [from, to])
+            };
+            if alive == 0 {
+                continue;
             }
+            self.visit(&ends, alive, &bounds, [from, to], &mut stack, &mut count, signs);
             if signs.is_done() {
                 return;
             }
@@ -193,25 +219,18 @@ impl<'a, L: Lanes> Walker<'a, L> {
         }
     }
 
-    /// Cuts a span into 8 `R` - 1 children; walks the cells of those that are left, in order, and puts what is too long or
-    /// too bent on the stack.
+    /// Cuts a span into 8 `R` - 1 children: which of them may meet the surface, and where they end.
     #[inline(always)]
-    fn descend<const R: usize>(
+    fn children<const R: usize>(
         &self,
         span: &Span,
         bounds: &Bounds,
         [from, to]: [f32; 2],
-        stack: &mut [[f32; 2]; STACK],
-        count: &mut usize,
-        signs: &mut Signs<'_>,
-    ) {
+    ) -> (u32, Ends) {
         let children = 8 * R - 1;
         let ds = 1.0 / children as f32;
         let off = bounds.bend * ds * ds + bounds.rounding;
         let height_off = bounds.height_bend * ds * ds + bounds.height_rounding;
-        if !(off + height_off).is_finite() {
-            return;
-        }
         let level = self.problem.grid.level(bounds.reach * ds + 2.0 * off);
 
         let zero = L::splat(0.0);
@@ -247,27 +266,28 @@ impl<'a, L: Lanes> Walker<'a, L> {
             alive |= (!out & 0xff) << (8 * r);
         }
         alive &= (1 << children) - 1;
-        if alive == 0 {
-            return;
+        // Never: all that goes in is finite.
+        if !(off + height_off).is_finite() {
+            alive = 0;
         }
-        let ends = Ends::new(&x, &y, &h, &range);
-        self.visit(&ends, alive, children, bounds, [from, to], stack, count, signs);
+        (alive, Ends::new(children, &x, &y, &h, &range))
     }
 
-    /// Goes through the children that are left.
+    /// Goes through the children that are left: walks their cells, in order, and puts what is too long or too bent on the
+    /// stack.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     fn visit(
         &self,
         ends: &Ends,
         mut alive: u32,
-        children: usize,
         bounds: &Bounds,
         [from, to]: [f32; 2],
         stack: &mut [[f32; 2]; STACK],
         count: &mut usize,
         signs: &mut Signs<'_>,
     ) {
+        let children = ends.children;
         let ds = 1.0 / children as f32;
         let off = bounds.bend * ds * ds;
         // As many children as one chord stays close over.
@@ -285,8 +305,8 @@ impl<'a, L: Lanes> Walker<'a, L> {
             if self.is_shortest(from, to) {
                 // f32 cannot tell its parts from one another: f64 looks at its ends.
                 let (a, b) = (f64::from(from), f64::from(to));
-                signs.point(self.curve, a, None, a, false);
-                signs.point(self.curve, b, None, b, false);
+                signs.point::<L>(self.curve, a, None, a, false);
+                signs.point::<L>(self.curve, b, None, b, false);
                 return;
             }
             if longest == 0 || ends.cells(first, last) > MOST_CELLS {
@@ -453,6 +473,7 @@ impl Span {
 
 /// The ends of up to 15 children.
 struct Ends {
+    children: usize,
     x: [f32; 16],
     y: [f32; 16],
     h: [f32; 16],
@@ -462,8 +483,9 @@ struct Ends {
 
 impl Ends {
     #[inline(always)]
-    fn new<L: Lanes, const R: usize>(x: &[L; R], y: &[L; R], h: &[L; R], range: &[L; R]) -> Self {
+    fn new<L: Lanes, const R: usize>(children: usize, x: &[L; R], y: &[L; R], h: &[L; R], range: &[L; R]) -> Self {
         let mut ends = Self {
+            children,
             x: [0.0; 16],
             y: [0.0; 16],
             h: [0.0; 16],

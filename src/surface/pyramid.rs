@@ -1,0 +1,188 @@
+//! The min/max pyramid over a displacement map: what a block of the map holds at least and at most.
+//!
+//! The finest blocks are 4x4 cells (cell (i, j) is the square between the centres of texels i, i+1 and j, j+1), those of
+//! the next level 8x8, and so on: B = 4, 8, 16, ... Entries are *dilated* over 2x2 blocks: entry (I, J) is the range of all
+//! texels of columns B I ..= B I + 2B and rows B J ..= B J + 2B. So **one entry covers any box of texel coordinates whose
+//! sides are at most B and whose lower left corner lies in block (I, J)**: a reader looks up one entry per box, not four. The
+//! undilated blocks are not stored.
+//!
+//! Columns and rows beyond the edge are those of the wrap mode: the first ones for repeat, the last one for clamp, the
+//! last ones backwards for mirror. A box is therefore looked up where its lower left corner is *after folding*: for
+//! repeat at the folded corner; for clamp at the clamped corner; for mirror at the corner of the box as it stands
+//! folded (where it was turned over, its other corner), and at 0 where it reaches below 0.
+//!
+//! Levels go on until one entry is left; its block is at least as large as the map, so it covers everything whatever the
+//! anchor. Entries are exact but for coarser ones that reach across an edge where the map goes on out of step with the blocks
+//! (repeat: a side that is not a multiple of B; mirror): they hold less than one block too much.
+//!
+//! The pairs take 2/16 of the map's bytes on the finest level and 1/6 in all, at most 20 % for maps of at least
+//! 64x64 texels.
+
+mod axis;
+mod build;
+mod entries;
+mod reduce;
+
+use axis::Axis;
+pub(crate) use entries::Entries;
+
+use super::{Texels, Wrap};
+
+/// The pyramid of one map, finest level first. Edits of the map keep it up to date.
+#[derive(Debug)]
+pub struct Pyramid {
+    levels: Box<[Level]>,
+    /// The finest level's sides.
+    axes: [Axis; 2],
+}
+
+/// One level: the ranges of blocks of one size.
+#[derive(Debug)]
+pub struct Level {
+    shift: u32,
+    width: usize,
+    height: usize,
+    entries: Entries,
+}
+
+impl Level {
+    /// log2 of the block's side B in cells: 2 for the finest level.
+    pub fn shift(&self) -> u32 {
+        self.shift
+    }
+
+    /// Blocks across: the map's width / B, rounded up.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Blocks up: the map's height / B, rounded up.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Smallest and largest texel of columns B i ..= B i + 2B and rows B j ..= B j + 2B, as stored: 0..=255, 0..=65535 or
+    /// heights (see [`DisplacementMap::unit`](super::DisplacementMap::unit)).
+    ///
+    /// # Panics
+    ///
+    /// If `i` or `j` is not below the level's width or height.
+    #[inline]
+    pub fn get(&self, i: usize, j: usize) -> (f32, f32) {
+        self.entries.get(self.index(i, j))
+    }
+
+    /// The pairs as stored, row by row.
+    pub(crate) fn entries(&self) -> &Entries {
+        &self.entries
+    }
+
+    #[inline]
+    fn index(&self, i: usize, j: usize) -> usize {
+        assert!(i < self.width && j < self.height, "block outside the map");
+        j * self.width + i
+    }
+}
+
+impl Pyramid {
+    /// Over width x height texels, at least 1x1, finite.
+    pub(super) fn new(texels: &Texels, width: usize, height: usize, wrap: Wrap) -> Self {
+        let axes = [width, height].map(|texels| Axis {
+            texels,
+            wrap,
+            shift: reduce::SIDE.ilog2(),
+        });
+        let levels = match texels {
+            Texels::U8(t) => build::levels(t, axes),
+            Texels::U16(t) => build::levels(t, axes),
+            Texels::F32(t) => build::levels(t, axes),
+        };
+        Self {
+            levels: levels.into_boxed_slice(),
+            axes,
+        }
+    }
+
+    /// The levels, finest first; the last has one entry.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// Smallest and largest texel of the whole map, as stored.
+    pub fn range(&self) -> (f32, f32) {
+        self.levels[self.levels.len() - 1].get(0, 0)
+    }
+
+    /// Bytes held by the entries.
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(|level| level.entries.bytes()).sum()
+    }
+
+    /// Brings the entries up to date after texels of columns `x.0..=x.1` and rows `y.0..=y.1` have changed. `row`
+    /// copies a run of a row of texels as they are now: row, first column, where to.
+    pub(super) fn update(
+        &self,
+        x: (usize, usize),
+        y: (usize, usize),
+        row: impl Fn(usize, usize, &mut [f32]),
+    ) {
+        let mut axes = self.axes;
+        let mut changed = [axes[0].holding(x.0, x.1), axes[1].holding(y.0, y.1)];
+        for js in changed[1].iter() {
+            for is in changed[0].iter() {
+                self.update_finest(is.clone(), js.clone(), &row);
+            }
+        }
+        for pair in self.levels.windows(2) {
+            let [finer, level] = pair else { continue };
+            changed = [0, 1].map(|k| axes[k].made_of(&changed[k]));
+            for j in changed[1].iter().flatten() {
+                for i in changed[0].iter().flatten() {
+                    let bounds = reduce::coarser(axes, (i, j), |i, j| finer.get(i, j));
+                    level.entries.set(level.index(i, j), bounds);
+                }
+            }
+            axes = axes.map(Axis::coarser);
+        }
+    }
+
+    fn update_finest(
+        &self,
+        is: std::ops::Range<usize>,
+        js: std::ops::Range<usize>,
+        row: &impl Fn(usize, usize, &mut [f32]),
+    ) {
+        /// Rows of blocks at a time, so that an edit of a whole map needs no second one in memory.
+        const BAND: usize = 64;
+        let (level, [x, y]) = (&self.levels[0], self.axes);
+        let first = reduce::SIDE * is.start;
+        let length = reduce::columns(is.len());
+        let mut texels = Vec::new();
+        for start in js.clone().step_by(BAND) {
+            let band = start..js.end.min(start + BAND);
+            let bottom = reduce::SIDE * band.start;
+            let rows = reduce::columns(band.len());
+            texels.resize(rows * length, 0.0);
+            for (j, out) in texels.chunks_exact_mut(length).enumerate() {
+                let j = y.wrap.texel((bottom + j) as i64, y.texels);
+                // What lies inside the map is one run; the few columns beyond are folded one by one.
+                let (inside, beyond) = out.split_at_mut(length.min(x.texels - first));
+                row(j, first, inside);
+                for (i, out) in (x.texels..).zip(beyond.chunks_exact_mut(1)) {
+                    row(j, x.wrap.texel(i as i64, x.texels), out);
+                }
+            }
+            let texels = &texels[..];
+            let texel_row = |j: usize| &texels[(j - bottom) * length..][..length];
+            let source = |i: usize| i; // never asked: the rows are as long as they must be
+            reduce::finest(band, length, texel_row, source, |j, strip| {
+                for (i, bounds) in is.clone().zip(strip.entries()) {
+                    level.entries.set(level.index(i, j), bounds);
+                }
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

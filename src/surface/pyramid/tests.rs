@@ -1,0 +1,186 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::surface::{DisplacementMap, TexelKind, TexelRect};
+
+pub const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror];
+pub const KINDS: [TexelKind; 3] = [TexelKind::U8, TexelKind::U16, TexelKind::F32];
+
+/// `count` texels without a pattern.
+pub fn noise(kind: TexelKind, count: usize, seed: u32) -> Texels {
+    let hash = |i: u32| {
+        let h = (i ^ seed.wrapping_mul(0x9e37_79b1)).wrapping_mul(0x85eb_ca6b);
+        (h ^ h >> 13).wrapping_mul(0xc2b2_ae35) >> 8
+    };
+    let all = 0..count as u32;
+    match kind {
+        TexelKind::U8 => Texels::U8(all.map(|i| hash(i) as u8).collect()),
+        TexelKind::U16 => Texels::U16(all.map(|i| hash(i) as u16).collect()),
+        // Zeros of both signs among them.
+        TexelKind::F32 => Texels::F32(
+            all.map(|i| (hash(i) as u16 as f32 - 30000.0) * f32::from(hash(i) % 5 > 0))
+                .collect(),
+        ),
+    }
+}
+
+fn map(kind: TexelKind, width: usize, height: usize, wrap: Wrap) -> DisplacementMap {
+    DisplacementMap::new(width, height, noise(kind, width * height, 1), wrap).unwrap()
+}
+
+/// Every entry, as stored.
+fn bits(pyramid: &Pyramid) -> Vec<Vec<(u32, u32)>> {
+    let level = |level: &Level| {
+        let all = (0..level.height).flat_map(|j| (0..level.width).map(move |i| (i, j)));
+        let bits = |(low, high): (f32, f32)| (low.to_bits(), high.to_bits());
+        all.map(|(i, j)| bits(level.get(i, j))).collect()
+    };
+    pyramid.levels().iter().map(level).collect()
+}
+
+/// What an entry must hold by definition, texel by texel.
+fn by_definition(map: &DisplacementMap, level: &Level, (i, j): (usize, usize)) -> (f32, f32) {
+    let (width, height) = map.size();
+    let reach = |block: usize| (block << level.shift)..=((block + 2) << level.shift);
+    let mut range = (f32::INFINITY, f32::NEG_INFINITY);
+    for y in reach(j) {
+        for x in reach(i) {
+            let x = map.wrap().texel(x as i64, width);
+            let y = map.wrap().texel(y as i64, height);
+            let h = map.texels().get(y * map.stride() + x);
+            range = (range.0.min(h), range.1.max(h));
+        }
+    }
+    range
+}
+
+proptest! {
+    #[test]
+    fn entries_hold_what_they_should(
+        width in 1usize..70, height in 1usize..70, wrap in 0..3usize, kind in 0..3usize,
+    ) {
+        let map = map(KINDS[kind], width, height, WRAPS[wrap]);
+        for level in map.pyramid().levels() {
+            let side = 1 << level.shift;
+            prop_assert_eq!(level.width, width.div_ceil(side));
+            prop_assert_eq!(level.height, height.div_ceil(side));
+            for j in 0..level.height {
+                for i in 0..level.width {
+                    let (low, high) = by_definition(&map, level, (i, j));
+                    let found = level.get(i, j);
+                    prop_assert!(found.0 <= low && found.1 >= high, "{} {i} {j}", level.shift);
+                    // Wider only where it reaches across an edge that cuts a block.
+                    let mirror = WRAPS[wrap] == Wrap::Mirror;
+                    let cut = |block: usize, n: usize| {
+                        (block + 2) * side >= n && (n % side != 0 || mirror)
+                    };
+                    let exact = level.shift == 2 || WRAPS[wrap] == Wrap::Clamp
+                        || !cut(i, width) && !cut(j, height);
+                    prop_assert!(!exact || found == (low, high), "{} {i} {j}", level.shift);
+                }
+            }
+        }
+        let top = &map.pyramid().levels()[map.pyramid().levels().len() - 1];
+        prop_assert_eq!((top.width, top.height), (1, 1));
+        prop_assert!(1 << top.shift >= width.max(height));
+    }
+
+    #[test]
+    fn one_entry_covers_a_box(
+        size in prop::array::uniform2(1usize..70), wrap in 0..3usize, level in 0..5usize,
+        at in prop::array::uniform2(0.0..1.0), part in prop::array::uniform2(0.0..1.0), inside in prop::array::uniform2(0.0..1.0),
+    ) {
+        let map = map(TexelKind::U16, size[0], size[1], WRAPS[wrap]);
+        let levels = map.pyramid().levels();
+        let level = &levels[level.min(levels.len() - 1)];
+        let side = f64::from(1 << level.shift);
+        let low = [at[0] * size[0] as f64, at[1] * size[1] as f64];
+        let p = [0, 1].map(|k| low[k] + side * part[k] * inside[k]);
+        let (a, b) = level.get(low[0] as usize >> level.shift, low[1] as usize >> level.shift);
+        let height = map.sample(p.into()).height * 65535.0;
+        prop_assert!(height >= f64::from(a) - 1e-6 && height <= f64::from(b) + 1e-6);
+    }
+
+    #[test]
+    fn an_edit_leaves_what_a_new_map_would_have(
+        size in prop::array::uniform2(1usize..70), wrap in 0..3usize, kind in 0..3usize,
+        from in prop::array::uniform2(0.0..1.0), to in prop::array::uniform2(0.0..1.0),
+    ) {
+        let (kind, wrap) = (KINDS[kind], WRAPS[wrap]);
+        let map = map(kind, size[0], size[1], wrap);
+        let start = [0, 1].map(|k| (from[k] * size[k] as f64) as usize);
+        let length = [0, 1].map(|k| 1 + (to[k] * (size[k] - start[k] - 1) as f64) as usize);
+        let rect = TexelRect { x: start[0], y: start[1], width: length[0], height: length[1] };
+        map.update(rect, &noise(kind, length[0] * length[1], 7)).unwrap();
+        let all = TexelRect { x: 0, y: 0, width: size[0], height: size[1] };
+        let new = DisplacementMap::new(size[0], size[1], map.read(all).unwrap(), wrap).unwrap();
+        prop_assert_eq!(bits(map.pyramid()), bits(new.pyramid()));
+        for index in 0..(size[0] + 1) * (size[1] + 1) {
+            prop_assert_eq!(map.texels().get(index).to_bits(), new.texels().get(index).to_bits());
+        }
+    }
+}
+
+/// Large enough for several threads and for several bands of an edit.
+#[test]
+fn an_edit_of_a_whole_large_map_leaves_what_a_new_one_has() {
+    let (width, height) = (1030, 1111);
+    for kind in KINDS {
+        let map = map(kind, width, height, Wrap::Repeat);
+        let (x, y) = (0, 0);
+        let rect = TexelRect {
+            x,
+            y,
+            width,
+            height,
+        };
+        let texels = noise(kind, width * height, 3);
+        map.update(rect, &texels).unwrap();
+        let new = DisplacementMap::new(width, height, texels, Wrap::Repeat).unwrap();
+        assert_eq!(bits(map.pyramid()), bits(new.pyramid()));
+    }
+}
+
+#[test]
+fn the_pyramid_takes_at_most_a_fifth_of_the_texels() {
+    for kind in KINDS {
+        for (width, height) in [
+            (64, 64),
+            (65, 65),
+            (64, 65),
+            (97, 66),
+            (129, 129),
+            (64, 3000),
+            (1000, 69),
+        ] {
+            let map = map(kind, width, height, Wrap::Repeat);
+            let (bytes, texels) = (map.pyramid().bytes(), width * height * kind.bytes());
+            assert!(5 * bytes <= texels, "{kind} {width}x{height}: {bytes}");
+            assert_eq!(map.bytes(), map.texels().bytes() + bytes);
+        }
+    }
+}
+
+#[test]
+fn pairs_are_stored_as_kernels_expect_them() {
+    use std::sync::atomic::Ordering::Relaxed;
+    let entries = |texels| {
+        let map = DisplacementMap::new(2, 1, texels, Wrap::Repeat).unwrap();
+        match &map.pyramid().levels()[0].entries {
+            Entries::U8(e) => e.iter().map(|e| e.load(Relaxed).into()).collect(),
+            Entries::U16(e) | Entries::F32(e) => {
+                e.iter().map(|e| e.load(Relaxed)).collect::<Vec<u32>>()
+            }
+        }
+    };
+    assert_eq!(entries(Texels::U8(vec![0x12, 0xfe])), [0xfe12, 0, 0]);
+    assert_eq!(
+        entries(Texels::U16(vec![0x1234, 0xfedc])),
+        [0xfedc_1234, 0, 0]
+    );
+    let [low, high] = [-2.5f32, 0.75].map(f32::to_bits);
+    assert_eq!(
+        entries(Texels::F32(vec![0.75, -2.5])),
+        [low, high, 0, 0, 0, 0]
+    );
+}
