@@ -1,7 +1,7 @@
 //! What a case is held to.
 //!
 //! A hit is *missed* when the oracle has one and the engine none, *extra* when it is on no crossing of the oracle's,
-//! *wrong* when it is not on the first: |dt| > 1e-3 of the size, the diagonal of the base mesh's box. None of the
+//! *wrong* when it is not on the first: |dt| > 1e-3 of the size, the diagonal of the base mesh's box ([`Case::same`]). None of the
 //! three is allowed, unless a ray that is moved by less than what single precision resolves would have been answered
 //! so: then the ray was at a silhouette or on the surface's rim, and is counted as *unsure*. The distances of the
 //! others from the oracle's crossing are in parts of the size, the angles between the normals in degrees.
@@ -16,9 +16,6 @@ use prismarch::trace::{Hit, INVALID_ID, Tracer};
 
 use super::oracle::{Crossing, Crossings, EDGE, Line, Oracle};
 
-/// Farther from the oracle's crossing than this part of the size is another crossing.
-const SAME: f64 = 1e-3;
-
 /// Part of the size that single precision resolves: of numbers a few sizes large, a few roundings deep.
 const RESOLVED: f64 = 3e-7;
 
@@ -30,6 +27,19 @@ pub struct Case {
     pub name: &'static str,
     pub surface: Arc<DisplacedSurface>,
     pub rays: Vec<Ray>,
+    /// Farther from the oracle's crossing than this part of the size is another crossing.
+    pub same: f64,
+}
+
+impl Case {
+    pub fn new(name: &'static str, surface: &Arc<DisplacedSurface>, rays: Vec<Ray>) -> Self {
+        Self {
+            name,
+            surface: surface.clone(),
+            rays,
+            same: 1e-3,
+        }
+    }
 }
 
 /// The most that a case may have.
@@ -61,7 +71,7 @@ pub fn judge(case: &Case) {
     let oracle = Oracle::new(&case.surface);
     let lines: Vec<Line> = case.rays.iter().map(Line::from).collect();
     let truths: Vec<Crossings> = lines.iter().map(|line| oracle.trace(line, EDGE)).collect();
-    let court = Court::new(&case.surface, oracle);
+    let court = Court::new(case, oracle);
     let mut faults = Vec::new();
     for (engine, tracer) in engines(&case.surface) {
         let mut score = Score::default();
@@ -78,21 +88,19 @@ pub fn judge(case: &Case) {
 
 struct Court<'s> {
     oracle: Oracle<'s>,
+    same: f64,
     size: f64,
     /// Rounding of a coordinate.
     ulp: f64,
 }
 
 impl<'s> Court<'s> {
-    fn new(surface: &'s DisplacedSurface, oracle: Oracle<'s>) -> Self {
-        let bounds = surface
-            .mesh()
-            .positions()
-            .iter()
-            .fold(Aabb::EMPTY, |bounds, &p| bounds.including(p));
+    fn new(case: &Case, oracle: Oracle<'s>) -> Self {
+        let bounds = case.surface.mesh().bounds();
         let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
         Self {
             oracle,
+            same: case.same,
             size: f64::from(bounds.diagonal()),
             ulp: f64::from(reach * f32::EPSILON),
         }
@@ -133,7 +141,7 @@ impl<'s> Court<'s> {
     }
 
     fn is_same(&self, line: &Line, crossing: &Crossing, t: f64) -> bool {
-        (crossing.t - t).abs() * line.direction.length() <= SAME * self.size
+        (crossing.t - t).abs() * line.direction.length() <= self.same * self.size
     }
 
     /// Whether a first hit at `t`, or none, is right: crossings that are not sure may be there or not.

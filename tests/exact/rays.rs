@@ -1,7 +1,7 @@
 //! Rays of all kinds at one surface.
 
 use glam::{DVec3, Vec3};
-use prismarch::ray::{Aabb, Ray};
+use prismarch::ray::Ray;
 use prismarch::surface::DisplacedSurface;
 
 use super::common::numbers::Numbers;
@@ -18,12 +18,10 @@ struct Aim<'a> {
 
 impl<'a> Aim<'a> {
     fn new(surface: &'a DisplacedSurface, seed: u64) -> Self {
-        let positions = surface.mesh().positions().iter();
-        let bounds = positions.fold(Aabb::EMPTY, |bounds, &p| bounds.including(p));
         Self {
             surface,
             numbers: Numbers::new(seed),
-            size: bounds.diagonal(),
+            size: surface.mesh().bounds().diagonal(),
         }
     }
 

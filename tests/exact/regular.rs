@@ -22,11 +22,7 @@ fn sphere(subdivisions: u32) -> MeshBuilder {
 
 fn mixed(name: &'static str, surface: std::sync::Arc<prismarch::surface::DisplacedSurface>) {
     let rays = rays::mixed(&surface, 1);
-    judge(&Case {
-        name,
-        surface,
-        rays,
-    });
+    judge(&Case::new(name, &surface, rays));
 }
 
 #[test]
@@ -99,11 +95,7 @@ fn constant_on_a_sphere() {
 fn constant_on_a_plane() {
     let surface = displaced(flat(3), maps::constant(0.75), 0.4, 0.25);
     let rays = rays::mixed(&surface, 2);
-    let case = Case {
-        name: "constant on a plane",
-        surface,
-        rays,
-    };
+    let case = Case::new("constant on a plane", &surface, rays);
     judge(&case);
     judge_plane(&case, 0.2);
 }

@@ -30,8 +30,10 @@ use rectangle::{Rectangle, Verdict, View};
 /// Half the side of the rectangles, in barycentric coordinates, at which halving ends.
 const SMALLEST: f64 = 1.0 / (1 << 21) as f64;
 
-/// Rectangles looked at per ray and triangle; more are needed only where the ray runs along inside the surface.
+/// Rectangles looked at, and places left undecided, per ray and triangle; more are needed only where the ray runs
+/// along inside the surface.
 const MOST_RECTANGLES: usize = 40_000;
+const MOST_BLURS: usize = 64;
 
 /// Crossings this close to an edge, in barycentric coordinates, are not sure to be on this triangle.
 pub const EDGE: f64 = 1e-9;
@@ -153,7 +155,7 @@ impl<'s> Oracle<'s> {
         let mut count = 0;
         while let Some(rectangle) = rest.pop() {
             count += 1;
-            if count > MOST_RECTANGLES {
+            if count > MOST_RECTANGLES || blurs.len() > MOST_BLURS {
                 found.incomplete = true;
                 break;
             }

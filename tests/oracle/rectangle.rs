@@ -189,11 +189,12 @@ impl<'a> View<'a> {
 
     /// Simplified Newton iteration: within a rectangle that is proven it contracts.
     fn root(&self, mut b: DVec2, inverse: DMat2, axes: [DVec3; 2]) -> DVec2 {
-        for _ in 0..200 {
+        // On a line between cells it may swing from one to the other and contract slowly.
+        for _ in 0..1000 {
             let miss = self.patch.point(b.x, b.y).position - self.origin;
             let step = inverse * DVec2::from(axes.map(|axis| axis.dot(miss)));
             b -= step;
-            if step.abs().max_element() < 1e-15 {
+            if step.abs().max_element() < 1e-14 {
                 break;
             }
         }
