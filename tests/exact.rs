@@ -13,6 +13,8 @@ mod maps;
 #[path = "exact/meshes.rs"]
 mod meshes;
 mod oracle;
+#[path = "oracle/tests.rs"]
+mod oracle_tests;
 #[path = "exact/rays.rs"]
 mod rays;
 

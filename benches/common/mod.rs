@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // every program uses a part
 
+pub mod closed;
 pub mod numbers;
 pub mod rays;
 pub mod scene;

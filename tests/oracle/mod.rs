@@ -17,8 +17,6 @@
 mod heights;
 mod interval;
 mod rectangle;
-#[cfg(test)]
-mod tests;
 
 use glam::{DVec2, DVec3};
 use prismarch::ray::Ray;
@@ -210,6 +208,19 @@ impl<'s> Oracle<'s> {
         }
         found.all.sort_by(|a, b| a.t.total_cmp(&b.t));
         found
+    }
+
+    /// Whether two crossings, not counting those on both sides of an edge, or a touch lie so close together that
+    /// single precision has no t to tell them apart.
+    pub fn is_tied(&self, ray: &Ray) -> bool {
+        let found = self.trace(&Line::from(ray), EDGE);
+        let tied = |pair: &[Crossing]| {
+            let gap = pair[1].t - pair[0].t;
+            let one = gap < 1e-12 && pair[0].prim != pair[1].prim;
+            !one && gap <= 4.0 * f64::from(f32::EPSILON) * pair[1].t.abs()
+        };
+        let undecided = |c: &Crossing| !c.sure && least_weight(DVec2::new(c.u, c.v)) > EDGE;
+        found.incomplete || found.all.windows(2).any(tied) || found.all.iter().any(undecided)
     }
 }
 

@@ -9,8 +9,8 @@ use prismarch::surface::{
     Wrap,
 };
 
-use super::{Crossing, EDGE, Line, Oracle};
-use crate::common::numbers::Numbers;
+use super::common::numbers::Numbers;
+use super::oracle::{Crossing, EDGE, Line, Oracle};
 
 /// Small triangles along an edge of the patch.
 const FINE: usize = 160;
