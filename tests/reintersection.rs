@@ -102,9 +102,9 @@ struct Count {
     /// The oracle agrees that there is a crease.
     creases: usize,
     /// Met the surface again at once, going away from it.
-    caught: Vec<Ray>,
+    caught: Vec<String>,
     /// Did not meet the surface at once, going towards it.
-    leaked: Vec<Ray>,
+    leaked: Vec<String>,
 }
 
 /// Sends rays from one hit to both sides.
@@ -143,9 +143,13 @@ fn leave(scene: &Scene, oracle: &Oracle<'_>, seen: &Ray, numbers: &mut Numbers, 
         if met == !real.is_empty() && apart > 2.0 {
             count.creases += 1;
         } else if met {
-            count.caught.push(ray);
+            count
+                .caught
+                .push(format!("{ray:?}\n  from {hit:?}\n  oracle {real:?}"));
         } else {
-            count.leaked.push(ray);
+            count
+                .leaked
+                .push(format!("{ray:?}\n  from {hit:?}\n  oracle {real:?}"));
         }
     }
 }
@@ -180,6 +184,6 @@ fn rays_leave_on_the_side_they_are_sent_to() {
         leaked.len()
     );
     assert!(rays > SHAPES * HITS && creases * 200 < rays);
-    assert!(caught.is_empty(), "{:?}", caught[0]);
-    assert!(leaked.is_empty(), "{:?}", leaked[0]);
+    assert!(caught.is_empty(), "caught: {}", caught[0]);
+    assert!(leaked.is_empty(), "leaked: {}", leaked.join("\n"));
 }
