@@ -18,10 +18,11 @@ mod oracle;
 
 use std::sync::Arc;
 
+use common::march;
 use common::numbers::Numbers;
 use glam::{Affine3A, Quat, Vec3};
 use oracle::{EDGE, Line, Oracle};
-use prismarch::prism::{March, Prisms};
+use prismarch::prism::Prisms;
 use prismarch::ray::Ray;
 use prismarch::render::RayOffset;
 use prismarch::surface::{DisplacedSurface, Wrap};
@@ -68,7 +69,7 @@ struct Scene {
 
 impl Scene {
     fn new(surface: &Arc<DisplacedSurface>) -> Self {
-        let prisms = Prisms::new(surface.clone(), March::default()).unwrap();
+        let prisms = Prisms::new(surface.clone(), march::under_test()).unwrap();
         let world = World::new(vec![Object {
             shape: Shape::Displaced(Arc::new(prisms)),
             placement: Placement::World,

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use prismarch::prism::{March, Prisms};
+use prismarch::prism::Prisms;
 use prismarch::ray::Ray;
 use prismarch::surface::{
     DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Texels, Wrap,
@@ -17,7 +17,7 @@ use prismarch::trace::Tracer;
 use rayon::prelude::*;
 
 use super::numbers::Numbers;
-use super::scene;
+use super::{march, scene};
 
 /// A closed surface around the origin, within [`REACH`] of it, that holds the ball of [`INSIDE`].
 pub struct Closed {
@@ -58,9 +58,9 @@ pub fn all() -> Vec<Closed> {
 }
 
 impl Closed {
-    /// Its prisms, with the default march.
+    /// Its prisms, with the march under test.
     pub fn prisms(&self) -> Prisms {
-        Prisms::new(self.surface.clone(), March::default()).expect("the default march is sound")
+        Prisms::new(self.surface.clone(), march::under_test()).expect("a sound march")
     }
 }
 

@@ -3,6 +3,7 @@
 #![allow(dead_code)] // every program uses a part
 
 pub mod closed;
+pub mod march;
 pub mod numbers;
 pub mod rays;
 pub mod scene;

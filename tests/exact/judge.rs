@@ -9,11 +9,12 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use prismarch::prism::{March, Prisms, SimdLevel, Step};
+use prismarch::prism::{PrismHit, Prisms, SimdLevel};
 use prismarch::ray::{Aabb, Ray};
 use prismarch::surface::DisplacedSurface;
 use prismarch::trace::{Hit, INVALID_ID, Tracer};
 
+use super::common::march;
 use super::oracle::{Crossing, Crossings, EDGE, Line, Oracle};
 
 /// Part of the size that single precision resolves: of numbers a few sizes large, a few roundings deep.
@@ -207,19 +208,8 @@ fn percentile(values: &mut [f64], part: f64) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// The march under test. `PRISMARCH_TEST_STEP=0.02` puts a uniform march of so many texels in its place, to hold the
-/// oracle and this judge against the simplest march there is.
-fn march() -> March {
-    let step = std::env::var("PRISMARCH_TEST_STEP").ok();
-    let step = step.map(|texels| texels.parse().expect("a number of texels"));
-    step.map_or_else(March::default, |texels| March::Uniform {
-        step: Step::Texels(texels),
-        jitter: false,
-    })
-}
-
 fn engines(surface: &Arc<DisplacedSurface>) -> Vec<(&'static str, Box<dyn Tracer>)> {
-    let prisms = || Prisms::new(surface.clone(), march()).unwrap();
+    let prisms = || Prisms::new(surface.clone(), march::under_test()).unwrap();
     let mut engines: Vec<(&str, Box<dyn Tracer>)> = Vec::new();
     for level in [SimdLevel::Baseline, SimdLevel::Avx2] {
         if let Some(prisms) = prisms().with_simd(level) {
@@ -274,7 +264,7 @@ impl Tracer for Loop {
             .candidates(ray)
             .filter_map(|p| self.prisms.intersect(p, ray));
         let first = hits.min_by(|a, b| a.t.total_cmp(&b.t))?;
-        let prismarch::prism::PrismHit { prim, t, u, v, ng } = first;
+        let PrismHit { prim, t, u, v, ng } = first;
         Some(Hit {
             t,
             u,
