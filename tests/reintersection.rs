@@ -141,7 +141,7 @@ fn leave(scene: &Scene, oracle: &Oracle<'_>, seen: &Ray, numbers: &mut Numbers, 
             let at = ray.origin.as_dvec3() + c.t * ray.direction.as_dvec3();
             at.distance(position.as_dvec3()) / f64::from(step)
         });
-        if met == !real.is_empty() && apart > 2.0 {
+        if met != real.is_empty() && apart > 2.0 {
             count.creases += 1;
         } else if met {
             count

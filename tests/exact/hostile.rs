@@ -9,9 +9,9 @@ use super::judge::{Case, judge};
 use super::meshes::{bent, displaced, flat, leaning, moved, texture_degenerate, torus};
 use super::{maps, rays};
 
-fn mixed(name: &'static str, surface: Arc<DisplacedSurface>) {
+fn mixed(name: &'static str, surface: Arc<DisplacedSurface>) -> Case {
     let rays = rays::mixed(&surface, 11);
-    judge(&Case::new(name, &surface, rays));
+    Case::new(name, &surface, rays)
 }
 
 /// Ten thousand times as long as wide, the map stretched with them.
@@ -19,41 +19,30 @@ fn mixed(name: &'static str, surface: Arc<DisplacedSurface>) {
 fn slivers() {
     let stretch = |mesh: MeshBuilder| moved(mesh, Affine3A::from_scale(Vec3::new(1.0, 1e-4, 1.0)));
     let map = maps::waves(24, Wrap::Clamp);
-    for (name, surface) in [
-        (
-            "flat slivers",
-            displaced(stretch(flat(2)), map.clone(), 0.1, 0.0),
-        ),
-        ("bent slivers", displaced(stretch(bent(4)), map, 0.05, 0.2)),
-    ] {
-        let rays = rays::mixed(&surface, 11);
-        // Several crossings lie within the strip's width of 1e-4.
-        judge(&Case {
-            same: 1e-5,
-            ..Case::new(name, &surface, rays)
-        });
-    }
+    let flat = displaced(stretch(flat(2)), map.clone(), 0.1, 0.0);
+    let bent = displaced(stretch(bent(4)), map, 0.05, 0.2);
+    let cases = [mixed("flat slivers", flat), mixed("bent slivers", bent)];
+    // Several crossings lie within the strip's width of 1e-4.
+    judge(cases.map(|case| Case { same: 1e-5, ..case }));
 }
 
 #[test]
 fn degenerate_texture_coordinates() {
     let mesh = texture_degenerate(&bent(4));
     let map = maps::white(24, 24, Wrap::Repeat);
-    mixed(
-        "degenerate texture coordinates",
-        displaced(mesh, map, 0.1, 0.0),
-    );
+    let surface = displaced(mesh, map, 0.1, 0.0);
+    judge([mixed("degenerate texture coordinates", surface)]);
 }
 
 #[test]
 fn scales() {
-    for (name, scale) in [("scale 1e-4", 1e-4), ("scale 1e4", 1e4)] {
-        let mesh = moved(torus(8), Affine3A::from_scale(Vec3::splat(scale)));
-        mixed(
-            name,
-            displaced(mesh, maps::waves(32, Wrap::Repeat), 0.2 * scale, 0.3),
-        );
-    }
+    judge(
+        [("scale 1e-4", 1e-4), ("scale 1e4", 1e4)].map(|(name, scale)| {
+            let mesh = moved(torus(8), Affine3A::from_scale(Vec3::splat(scale)));
+            let map = maps::waves(32, Wrap::Repeat);
+            mixed(name, displaced(mesh, map, 0.2 * scale, 0.3))
+        }),
+    );
 }
 
 #[test]
@@ -68,10 +57,12 @@ fn far_from_the_origin() {
         0.15,
         0.3,
     );
-    mixed("10^4 sizes away", surface);
-    let leaning = leaning(moved(bent(2), place), 0.4, 5);
-    let surface = displaced(leaning, maps::white(12, 12, Wrap::Clamp), 0.1, 0.0);
-    mixed("10^4 sizes away, leaning", surface);
+    let mesh = leaning(moved(bent(2), place), 0.4, 5);
+    let leaning = displaced(mesh, maps::white(12, 12, Wrap::Clamp), 0.1, 0.0);
+    judge([
+        mixed("10^4 sizes away", surface),
+        mixed("10^4 sizes away, leaning", leaning),
+    ]);
 }
 
 /// No offset triangle ever crosses such a ray's path: all of them are parallel to it.
@@ -79,36 +70,41 @@ fn far_from_the_origin() {
 fn rays_in_the_base_plane() {
     let surface = displaced(flat(3), maps::white(24, 24, Wrap::Clamp), 0.3, 0.5);
     let rays = rays::in_plane(&surface, [-0.16, 0.16], 12);
-    judge(&Case::new("rays in the base plane", &surface, rays));
+    let upright = Case::new("rays in the base plane", &surface, rays);
     let mut mesh = flat(3);
     mesh.normals.fill(Vec3::new(0.3, -0.4, 0.9));
     let surface = displaced(mesh, maps::waves(24, Wrap::Clamp), 0.3, 0.5);
     let rays = rays::in_plane(&surface, [-0.1, 0.1], 13);
-    judge(&Case::new("the same, slanted normals", &surface, rays));
+    judge([
+        upright,
+        Case::new("the same, slanted normals", &surface, rays),
+    ]);
 }
 
 #[test]
 fn rays_along_normals() {
-    for (name, mesh) in [
+    let meshes = [
         ("along normals, flat", flat(3)),
         ("along normals, bent", bent(3)),
         ("along normals, leaning", leaning(bent(3), 0.3, 6)),
-    ] {
+    ];
+    judge(meshes.map(|(name, mesh)| {
         let surface = displaced(mesh, maps::white(20, 20, Wrap::Mirror), 0.1, 0.3);
         let rays = rays::along_normals(&surface, 14);
-        judge(&Case::new(name, &surface, rays));
-    }
+        Case::new(name, &surface, rays)
+    }));
 }
 
 #[test]
 fn rays_through_vertices_and_edges() {
-    for (name, mesh) in [
+    let meshes = [
         ("through edges, flat", flat(4)),
         ("through edges, torus", torus(8)),
         ("through edges, leaning", leaning(bent(4), 0.3, 7)),
-    ] {
+    ];
+    judge(meshes.map(|(name, mesh)| {
         let surface = displaced(mesh, maps::waves(24, Wrap::Repeat), 0.1, 0.3);
         let rays = rays::through_edges(&surface, 15);
-        judge(&Case::new(name, &surface, rays));
-    }
+        Case::new(name, &surface, rays)
+    }));
 }

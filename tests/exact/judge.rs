@@ -63,12 +63,17 @@ struct Score {
     example: Option<String>,
 }
 
-/// Traces a case with all engines, prints a line for each.
+/// Traces cases with all engines, prints a line for each.
 ///
 /// # Panics
 ///
-/// When an engine passes a limit.
-pub fn judge(case: &Case) {
+/// When an engine passes a limit in any of them.
+pub fn judge(cases: impl IntoIterator<Item = Case>) {
+    let faults: Vec<String> = cases.into_iter().flat_map(|case| faults(&case)).collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+fn faults(case: &Case) -> Vec<String> {
     let oracle = Oracle::new(&case.surface);
     let lines: Vec<Line> = case.rays.iter().map(Line::from).collect();
     let truths: Vec<Crossings> = lines.iter().map(|line| oracle.trace(line, EDGE)).collect();
@@ -81,10 +86,9 @@ pub fn judge(case: &Case) {
             score.occlusion += usize::from(tracer.occluded(ray) != hit.is_some());
             court.weigh(line, truth, hit.as_ref(), &mut score);
         }
-        let fault = score.report(case.name, engine, case.rays.len(), court.coarseness());
-        faults.extend(fault);
+        faults.extend(score.report(case.name, engine, case.rays.len(), court.coarseness()));
     }
-    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    faults
 }
 
 struct Court<'s> {
@@ -130,14 +134,12 @@ impl<'s> Court<'s> {
                 .example
                 .get_or_insert_with(|| format!("{line:?}\n  answer {hit:?}\n  oracle {first:?}"));
         } else if let (Some(hit), Some(t)) = (hit, t)
-            && let Some(c) = first.iter().rev().find(|c| self.is_same(line, c, t))
+            && let Some(c) = first.last().filter(|c| c.sure && self.is_same(line, c, t))
         {
-            if c.sure {
-                let distance = (t - c.t).abs() * line.direction.length() / self.size;
-                score.distances.push(distance);
-                let cos = hit.ng.as_dvec3().normalize_or_zero().dot(c.ng);
-                score.angles.push(cos.clamp(-1.0, 1.0).acos().to_degrees());
-            }
+            let distance = (t - c.t).abs() * line.direction.length() / self.size;
+            score.distances.push(distance);
+            let cos = hit.ng.as_dvec3().normalize_or_zero().dot(c.ng);
+            score.angles.push(cos.clamp(-1.0, 1.0).acos().to_degrees());
         }
     }
 

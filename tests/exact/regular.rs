@@ -1,9 +1,10 @@
 //! Meshes and maps as artists make them.
 
 use std::f32::consts::FRAC_PI_3;
+use std::sync::Arc;
 
 use glam::Vec2;
-use prismarch::surface::{MeshBuilder, UvTransform, Wrap};
+use prismarch::surface::{DisplacedSurface, MeshBuilder, UvTransform, Wrap};
 
 use super::common::scene;
 use super::judge::{Case, judge, judge_plane};
@@ -20,9 +21,13 @@ fn sphere(subdivisions: u32) -> MeshBuilder {
     }
 }
 
-fn mixed(name: &'static str, surface: std::sync::Arc<prismarch::surface::DisplacedSurface>) {
+fn case(name: &'static str, surface: Arc<DisplacedSurface>) -> Case {
     let rays = rays::mixed(&surface, 1);
-    judge(&Case::new(name, &surface, rays));
+    Case::new(name, &surface, rays)
+}
+
+fn mixed(name: &'static str, surface: Arc<DisplacedSurface>) {
+    judge([case(name, surface)]);
 }
 
 #[test]
@@ -93,11 +98,12 @@ fn constant_on_a_sphere() {
 
 #[test]
 fn constant_on_a_plane() {
-    let surface = displaced(flat(3), maps::constant(0.75), 0.4, 0.25);
-    let rays = rays::mixed(&surface, 2);
-    let case = Case::new("constant on a plane", &surface, rays);
-    judge(&case);
+    let case = case(
+        "constant on a plane",
+        displaced(flat(3), maps::constant(0.75), 0.4, 0.25),
+    );
     judge_plane(&case, 0.2);
+    judge([case]);
 }
 
 #[test]
@@ -121,37 +127,39 @@ fn uv_transform() {
 
 #[test]
 fn many_repeats() {
-    for (name, wrap) in [
+    let modes = [
         ("9 repeats", Wrap::Repeat),
         ("9 repeats clamped", Wrap::Clamp),
         ("9 repeats mirrored", Wrap::Mirror),
-    ] {
+    ];
+    judge(modes.map(|(name, wrap)| {
         let mesh = remapped(bent(2), 9.0, 0.4);
-        mixed(name, displaced(mesh, maps::white(4, 5, wrap), 0.06, 0.0));
-    }
+        case(name, displaced(mesh, maps::white(4, 5, wrap), 0.06, 0.0))
+    }));
 }
 
 #[test]
 fn kinds_of_texels() {
-    mixed(
-        "8-bit map",
-        displaced(bent(3), maps::white_8_bit(20), 0.1, 0.0),
-    );
-    mixed(
-        "float map",
-        displaced(bent(3), maps::white_float(20), 0.02, 1.0),
-    );
+    judge([
+        case(
+            "8-bit map",
+            displaced(bent(3), maps::white_8_bit(20), 0.1, 0.0),
+        ),
+        case(
+            "float map",
+            displaced(bent(3), maps::white_float(20), 0.02, 1.0),
+        ),
+    ]);
 }
 
 #[test]
 fn maps_of_one_row_or_column_or_texel() {
-    for (name, width, height) in [("1xN map", 1, 30), ("Nx1 map", 30, 1), ("1x1 map", 1, 1)] {
-        for wrap in [Wrap::Repeat, Wrap::Mirror] {
+    let sizes = [("1xN map", 1, 30), ("Nx1 map", 30, 1), ("1x1 map", 1, 1)];
+    for wrap in [Wrap::Repeat, Wrap::Mirror] {
+        judge(sizes.map(|(name, width, height)| {
             let mesh = remapped(bent(2), 1.0, 0.2);
-            mixed(
-                name,
-                displaced(mesh, maps::white(width, height, wrap), 0.1, 0.0),
-            );
-        }
+            let map = maps::white(width, height, wrap);
+            case(name, displaced(mesh, map, 0.1, 0.0))
+        }));
     }
 }
