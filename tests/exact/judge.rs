@@ -124,12 +124,16 @@ impl<'s> Court<'s> {
                 score.unsure += 1;
                 return;
             }
+            let on_surface = |t: f64| truth.all.iter().any(|c| self.is_same(line, c, t));
             let count = match t {
                 None => &mut score.missed,
-                Some(t) if truth.all.iter().any(|c| self.is_same(line, c, t)) => &mut score.wrong,
+                Some(t) if on_surface(t) => &mut score.wrong,
                 Some(_) => &mut score.extra,
             };
             *count += 1;
+            if t.is_some_and(|t| !on_surface(t)) {
+                score.example = None; // the strangest fault is shown
+            }
             score
                 .example
                 .get_or_insert_with(|| format!("{line:?}\n  answer {hit:?}\n  oracle {first:?}"));
@@ -138,8 +142,12 @@ impl<'s> Court<'s> {
         {
             let distance = (t - c.t).abs() * line.direction.length() / self.size;
             score.distances.push(distance);
-            let cos = hit.ng.as_dvec3().normalize_or_zero().dot(c.ng);
-            score.angles.push(cos.clamp(-1.0, 1.0).acos().to_degrees());
+            let mut cos = cosine(truth, c.t, hit);
+            if cos < NORMAL_P99.to_radians().cos() {
+                // S is bent along edges: within the overlap the normal is either side's.
+                cos = cosine(&self.oracle.trace(line, OVERLAP), c.t, hit);
+            }
+            score.angles.push(cos.min(1.0).acos().to_degrees());
         }
     }
 
@@ -171,6 +179,14 @@ impl<'s> Court<'s> {
             self.is_answer(&moved, &self.oracle.trace(&moved, EDGE), t)
         })
     }
+}
+
+/// Between the hit's normal and the nearest of the oracle's at `t`.
+fn cosine(truth: &Crossings, t: f64, hit: &Hit) -> f64 {
+    let here = |c: &&Crossing| (c.t - t).abs() <= 1e-5 * t.abs();
+    let ng = hit.ng.as_dvec3().normalize_or_zero();
+    let cosines = truth.all.iter().filter(here).map(|c| c.ng.dot(ng));
+    cosines.fold(-1.0, f64::max)
 }
 
 impl Score {

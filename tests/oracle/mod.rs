@@ -70,6 +70,8 @@ pub struct Crossing {
     pub grazing: f64,
     /// False for a root that may be double or none, or on the triangle's edge.
     pub sure: bool,
+    /// A single root, within [`EDGE`] of the triangle's edge.
+    pub on_edge: bool,
 }
 
 impl Crossing {
@@ -87,6 +89,7 @@ impl Crossing {
             ng,
             grazing: ng.dot(direction.normalize()).abs(),
             sure: sure && least_weight(b) > EDGE,
+            on_edge: sure && least_weight(b) <= EDGE,
         }
     }
 }
@@ -101,6 +104,18 @@ pub struct Crossings {
 }
 
 impl Crossings {
+    /// A crossing on an edge is sure after all where the triangles on both sides have it.
+    fn confirm_edges(&mut self) {
+        for k in 1..self.all.len() {
+            let [a, b] = [self.all[k - 1], self.all[k]];
+            let same = b.t - a.t <= 1e-11 * b.t.abs() && a.prim != b.prim;
+            if same && a.on_edge && b.on_edge {
+                self.all[k - 1].sure = true;
+                self.all[k].sure = true;
+            }
+        }
+    }
+
     /// The crossings that the line's interval holds, up to the first that is sure.
     pub fn first(&self, line: &Line) -> &[Crossing] {
         let [near, far] = line.interval;
@@ -207,6 +222,7 @@ impl<'s> Oracle<'s> {
             found.all.extend(here.all);
         }
         found.all.sort_by(|a, b| a.t.total_cmp(&b.t));
+        found.confirm_edges();
         found
     }
 
@@ -219,7 +235,7 @@ impl<'s> Oracle<'s> {
             let one = gap < 1e-12 && pair[0].prim != pair[1].prim;
             !one && gap <= 4.0 * f64::from(f32::EPSILON) * pair[1].t.abs()
         };
-        let undecided = |c: &Crossing| !c.sure && least_weight(DVec2::new(c.u, c.v)) > EDGE;
+        let undecided = |c: &Crossing| !c.sure && !c.on_edge;
         found.incomplete || found.all.windows(2).any(tied) || found.all.iter().any(undecided)
     }
 }
