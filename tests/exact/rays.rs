@@ -7,7 +7,7 @@ use prismarch::surface::DisplacedSurface;
 use super::common::numbers::Numbers;
 
 /// Rays per case. Without full optimisation fewer, so that the whole stays below a minute.
-pub const COUNT: usize = if cfg!(debug_assertions) { 300 } else { 2000 };
+pub const COUNT: usize = if cfg!(debug_assertions) { 200 } else { 2000 };
 
 /// A point on S with its unit normal, and the size of it all.
 struct Aim<'a> {
