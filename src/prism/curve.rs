@@ -184,10 +184,16 @@ impl<Q: Quad> View<Q> {
                 counter_clockwise: above == 7,
             });
         }
-        match (below == 0, above == 0) {
-            (true, true) => Cut::Many,
-            (false, false) => Cut::None,
-            (counter_clockwise, _) => self.cut_by_sides([low, high], counter_clockwise),
+        let found = if below == 0 {
+            self.cut_by_sides([low, high], true)
+        } else {
+            Cut::None
+        };
+        match found {
+            Cut::None if above == 0 => self.cut_by_sides([low, high], false),
+            // The triangle may turn over within the range.
+            Cut::One(_) if above == 0 => Cut::Many,
+            found => found,
         }
     }
 
