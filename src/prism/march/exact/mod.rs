@@ -100,25 +100,37 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Rare<'_, Q> {
     #[inline(always)]
     fn run(self) -> Option<Found> {
         let Self { problem, frame, .. } = self;
-        let mut nearest = None;
         if pieces::is_edge_on(self.view, self.range) {
-            let patch = problem.patch();
-            let (heights, count) = pieces::planes_that_hold(&patch, frame, self.range);
-            for &w in &heights[..count] {
-                if let Some(part) = pieces::flat::<L::Quad>(&patch, frame, w) {
-                    let mut signs = Signs::new(problem);
-                    Walker::<L>::new(problem, &part, self.view, part.ends()).walk(&mut signs);
-                    nearest = nearer(nearest, signs.nearest());
-                }
-            }
-            return nearest;
+            return edge_on::<L>(problem, frame, self.view, self.range);
         }
+        let mut nearest = None;
         // A loop, not an iterator: lanes must not pass through functions that lack the kernel's instruction set.
         for stretch in self.view.stretches(self.range).as_slice() {
             nearest = nearer(nearest, along::<L>(problem, frame, stretch, self.view));
         }
         nearest
     }
+}
+
+/// The ray lies in the planes of the prism's triangles: it meets them at the one or few w whose plane holds it.
+#[inline(always)]
+fn edge_on<L: Lanes>(
+    problem: &Problem<'_>,
+    frame: &RayFrame,
+    view: &View<L::Quad>,
+    range: [f64; 2],
+) -> Option<Found> {
+    let patch = problem.patch();
+    let (heights, count) = pieces::planes_that_hold(&patch, frame, range);
+    let mut nearest = None;
+    for &w in &heights[..count] {
+        if let Some(part) = pieces::flat::<L::Quad>(&patch, frame, w) {
+            let mut signs = Signs::new(problem);
+            Walker::<L>::new(problem, &part, view, part.ends()).walk(&mut signs);
+            nearest = nearer(nearest, signs.nearest());
+        }
+    }
+    nearest
 }
 
 #[inline(always)]
@@ -143,6 +155,7 @@ fn along<L: Lanes>(
     let curve = Curve::new(view, &texels, stretch, frame);
     let ends = curve.ends();
     if problem.is_ordered()
+        && curve.is_wide
         && (ends[1] as f32 <= problem.interval[0] || ends[0] as f32 >= problem.interval[1])
     {
         return None;
@@ -174,6 +187,11 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
     #[inline(always)]
     fn run(self) -> Option<Found> {
         let Self { problem, frame, .. } = self;
+        let [low, high] = problem.cluster.offsets(problem.lane);
+        let range = [low.into(), high.into()];
+        if pieces::is_edge_on(self.view, range) {
+            return edge_on::<L>(problem, frame, self.view, range);
+        }
         let mut signs = Signs::new(problem);
         let mut pieces = pieces::Pieces::new(self.curve, self.view);
         while let Some(piece) = pieces.next() {

@@ -20,6 +20,9 @@ const EVEN: f64 = 0.25;
 /// Texels a piece may reach from its base.
 const LONGEST: f64 = 8192.0;
 
+/// Pieces at most: a stretch is cut in a few dozen where it is cut at all, and must end where numbers are not.
+const MOST_PIECES: usize = 4096;
+
 /// Halvings at most: below 2^-40 of a stretch w is constant.
 const DEPTH: usize = 40;
 
@@ -67,6 +70,7 @@ pub struct Pieces<'a, Q> {
     from: f64,
     /// What A must exceed.
     least: f64,
+    given: usize,
 }
 
 impl<'a, Q: Quad + 'a> Pieces<'a, Q> {
@@ -83,6 +87,7 @@ impl<'a, Q: Quad + 'a> Pieces<'a, Q> {
             count: 1,
             from: 0.0,
             least: EDGE_ON * view.width * view.width / unit,
+            given: 0,
         }
     }
 
@@ -105,13 +110,14 @@ impl<'a, Q: Quad + 'a> Pieces<'a, Q> {
             let [least, most] = bounds(part);
             let flat = most <= self.least || b - a < 0.5f64.powi(DEPTH as i32);
             let even = least > EVEN * most && self.reach(a, b) < LONGEST;
-            if !flat && !even && b > a {
+            if !flat && !even && self.given < MOST_PIECES {
                 self.ahead[self.count] = 0.5 * (a + b);
                 self.count += 1;
                 continue;
             }
             self.from = b;
             self.count -= 1;
+            self.given += 1;
             return Some(if flat {
                 Piece::Flat(self.curve.w(0.5 * (a + b)))
             } else {
