@@ -1,11 +1,11 @@
 //! Prisms for the exact march: clusters of eight, and the hit test of one cluster.
 
-use super::cluster::{Cluster, groups};
+use super::cluster::{Cluster, MOST_PRISMS, groups};
 use super::cull::Pairs;
-use super::march::exact::{Found, Problem, root, search};
+use super::march::exact::{Found, Problem, Walls, root, search};
 use super::ray_frame::RayFrame;
 use super::simd::{Grid, LANES, Lanes};
-use super::{Parts, PrismHit, Prisms};
+use super::{MarchError, Parts, PrismHit, Prisms};
 use crate::ray::Ray;
 use crate::surface::DisplacedSurface;
 
@@ -17,22 +17,28 @@ pub struct ExactPrisms {
 }
 
 impl ExactPrisms {
-    pub fn new(surface: &DisplacedSurface) -> Self {
+    pub fn new(surface: &DisplacedSurface) -> Result<Self, MarchError> {
         let prims = surface.mesh().triangles().len();
+        if prims > MOST_PRISMS {
+            return Err(MarchError::TooManyTriangles {
+                found: prims,
+                max: MOST_PRISMS,
+            });
+        }
         let centroids: Vec<_> = (0..prims as u32)
             .map(|prim| {
                 let [a, b, c] = surface.mesh().corners(prim).map(|p| p.as_dvec3());
                 a + b + c
             })
             .collect();
-        let offsets = |prim| surface.patch(prim).offsets();
-        Self {
+        let offsets = |prim| surface.offsets(prim);
+        Ok(Self {
             clusters: groups(&centroids)
                 .chunks(LANES)
                 .map(|prims| Cluster::new(surface, prims, offsets))
                 .collect(),
             prims,
-        }
+        })
     }
 
     /// Prisms in a cluster: its first lanes.
@@ -52,6 +58,7 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     let mut interval = frame.interval;
     let mut alive = meeting::<L>(cluster, &frame) & ((1 << exact.len(index as usize)) - 1);
     let mut nearest: Option<(Found, usize)> = None;
+    let mut wall: Option<PrismHit> = None;
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
@@ -66,6 +73,19 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
                 interval[1] = (found.t as f32).next_up().min(frame.interval[1]);
             }
         }
+        if cluster.walls(lane) != 0
+            && let Some(found) = prisms.walls::<L>(cluster, lane, &frame, interval, false)
+            && wall.is_none_or(|best| found.is_before(&best))
+        {
+            wall = Some(found);
+            interval[1] = found.t.next_up().min(frame.interval[1]);
+        }
+    }
+    // Of two at the same t the surface.
+    if let Some(wall) = wall
+        && nearest.is_none_or(|(found, _)| wall.t < found.t as f32)
+    {
+        return Some(wall);
     }
     let (found, lane) = nearest?;
     let member = prisms.member(cluster, lane);
@@ -86,6 +106,13 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
         if prisms
             .search::<L>(cluster, lane, &frame, frame.interval, true)
             .is_some()
+        {
+            return true;
+        }
+        if cluster.walls(lane) != 0
+            && prisms
+                .walls::<L>(cluster, lane, &frame, frame.interval, true)
+                .is_some()
         {
             return true;
         }
@@ -141,5 +168,33 @@ impl Prisms {
             interval,
         };
         search::<L>(&problem, frame)
+    }
+
+    /// The first wall of a prism that has some.
+    #[inline(always)]
+    fn walls<L: Lanes>(
+        &self,
+        cluster: &Cluster,
+        lane: usize,
+        frame: &RayFrame,
+        interval: [f32; 2],
+        any: bool,
+    ) -> Option<PrismHit> {
+        let member = self.member(cluster, lane);
+        let problem = Problem {
+            patch: &member.patch,
+            grid: &Grid::new(self.surface.map()),
+            offsets: member.offsets,
+            ordered: !member.folded,
+            any,
+            interval,
+        };
+        L::outline(Walls {
+            problem: &problem,
+            frame,
+            surface: &self.surface,
+            prim: member.prim,
+            sides: cluster.walls(lane),
+        })
     }
 }

@@ -12,6 +12,7 @@ mod cells;
 mod pieces;
 mod signs;
 mod span;
+mod walls;
 
 use glam::DVec3;
 
@@ -23,6 +24,7 @@ use crate::surface::Patch;
 use pieces::Piece;
 use signs::Signs;
 use span::Walker;
+pub use walls::Walls;
 
 /// The prism, the map, and what is asked of them.
 pub struct Problem<'a> {
