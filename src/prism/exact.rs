@@ -2,9 +2,9 @@
 
 use super::cluster::{Cluster, MOST_PRISMS, groups};
 use super::cull::Pairs;
-use super::march::exact::{Found, Problem, Walls, root, search};
-use super::ray_frame::RayFrame;
-use super::simd::{Grid, LANES, Lanes};
+use super::march::exact::{Found, Problem, root, search, walls};
+use super::ray_frame::{RayFrame, RayLanes, axes};
+use super::simd::{LANES, Lanes};
 use super::{MarchError, Parts, PrismHit, Prisms};
 use crate::ray::Ray;
 use crate::surface::DisplacedSurface;
@@ -54,15 +54,19 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     let Parts::Exact(exact) = &prisms.parts else {
         return None;
     };
-    let (cluster, frame) = (&exact.clusters[index as usize], RayFrame::new(ray));
-    let mut interval = frame.interval;
-    let mut alive = meeting::<L>(cluster, &frame) & ((1 << exact.len(index as usize)) - 1);
+    let (cluster, axes) = (&exact.clusters[index as usize], axes(ray));
+    let mut alive = meeting::<L>(cluster, ray, axes) & ((1 << exact.len(index as usize)) - 1);
+    if alive == 0 {
+        return None;
+    }
+    let frame = RayFrame::new(ray, axes);
+    let mut interval = [ray.tnear, ray.tfar];
     let mut nearest: Option<(Found, usize)> = None;
     let mut wall: Option<PrismHit> = None;
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
-        if let Some(found) = prisms.search::<L>(cluster, lane, &frame, interval, false) {
+        if let Some(found) = search::<L>(&prisms.problem(cluster, lane, interval, false), &frame) {
             // Of two at the same t the lower base triangle, whatever the order of the lanes.
             let beats = nearest.is_none_or(|(best, of)| {
                 let (new, old) = (found.t as f32, best.t as f32);
@@ -70,15 +74,15 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
             });
             if beats {
                 nearest = Some((found, lane));
-                interval[1] = (found.t as f32).next_up().min(frame.interval[1]);
+                interval[1] = (found.t as f32).next_up().min(ray.tfar);
             }
         }
         if cluster.walls(lane) != 0
-            && let Some(found) = prisms.walls::<L>(cluster, lane, &frame, interval, false)
+            && let Some(found) = walls::<L>(&prisms.problem(cluster, lane, interval, false), &frame)
             && wall.is_none_or(|best| found.is_before(&best))
         {
             wall = Some(found);
-            interval[1] = found.t.next_up().min(frame.interval[1]);
+            interval[1] = found.t.next_up().min(ray.tfar);
         }
     }
     // Of two at the same t the surface.
@@ -88,8 +92,8 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
         return Some(wall);
     }
     let (found, lane) = nearest?;
-    let member = prisms.member(cluster, lane);
-    Some(root(&member.patch, &found).to_hit(member.prim))
+    let problem = prisms.problem(cluster, lane, interval, false);
+    Some(root::<L>(&problem, &found).to_hit(cluster.prim(lane)))
 }
 
 /// Whether a cluster is hit at all.
@@ -98,21 +102,18 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
     let Parts::Exact(exact) = &prisms.parts else {
         return false;
     };
-    let (cluster, frame) = (&exact.clusters[index as usize], RayFrame::new(ray));
-    let mut alive = meeting::<L>(cluster, &frame) & ((1 << exact.len(index as usize)) - 1);
+    let (cluster, axes) = (&exact.clusters[index as usize], axes(ray));
+    let mut alive = meeting::<L>(cluster, ray, axes) & ((1 << exact.len(index as usize)) - 1);
+    if alive == 0 {
+        return false;
+    }
+    let frame = RayFrame::new(ray, axes);
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
-        if prisms
-            .search::<L>(cluster, lane, &frame, frame.interval, true)
-            .is_some()
-        {
-            return true;
-        }
-        if cluster.walls(lane) != 0
-            && prisms
-                .walls::<L>(cluster, lane, &frame, frame.interval, true)
-                .is_some()
+        let problem = prisms.problem(cluster, lane, [ray.tnear, ray.tfar], true);
+        if search::<L>(&problem, &frame).is_some()
+            || cluster.walls(lane) != 0 && walls::<L>(&problem, &frame).is_some()
         {
             return true;
         }
@@ -122,79 +123,32 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
 
 /// The lanes whose prisms the ray may meet.
 #[inline(always)]
-fn meeting<L: Lanes>(cluster: &Cluster, frame: &RayFrame) -> u32 {
-    let (vertices, normals, offsets) = cluster.lanes::<L>(frame.axes);
-    let (origin, shear, per_depth, interval) = frame.splat::<L>();
+fn meeting<L: Lanes>(cluster: &Cluster, ray: &Ray, axes: [usize; 3]) -> u32 {
+    let (vertices, normals, offsets) = cluster.lanes::<L>(axes);
     Pairs {
         vertices,
         normals,
         offsets,
-        origin,
-        shear,
-        per_depth,
-        interval,
+        ray: RayLanes::splat(ray, axes),
     }
     .may_meet()
 }
 
 impl Prisms {
     #[inline(always)]
-    fn member(&self, cluster: &Cluster, lane: usize) -> super::cluster::Member<'_> {
-        let displacement = self.surface.displacement();
-        cluster.member(
-            lane,
-            self.surface.map(),
-            f64::from(displacement.scale),
-            f64::from(displacement.midlevel),
-        )
-    }
-
-    #[inline(always)]
-    fn search<L: Lanes>(
-        &self,
-        cluster: &Cluster,
+    fn problem<'a>(
+        &'a self,
+        cluster: &'a Cluster,
         lane: usize,
-        frame: &RayFrame,
         interval: [f32; 2],
         any: bool,
-    ) -> Option<Found> {
-        let member = self.member(cluster, lane);
-        let problem = Problem {
-            patch: &member.patch,
-            grid: &Grid::new(self.surface.map()),
-            offsets: member.offsets,
-            ordered: !member.folded,
-            any,
-            interval,
-        };
-        search::<L>(&problem, frame)
-    }
-
-    /// The first wall of a prism that has some.
-    #[inline(always)]
-    fn walls<L: Lanes>(
-        &self,
-        cluster: &Cluster,
-        lane: usize,
-        frame: &RayFrame,
-        interval: [f32; 2],
-        any: bool,
-    ) -> Option<PrismHit> {
-        let member = self.member(cluster, lane);
-        let problem = Problem {
-            patch: &member.patch,
-            grid: &Grid::new(self.surface.map()),
-            offsets: member.offsets,
-            ordered: !member.folded,
-            any,
-            interval,
-        };
-        L::outline(Walls {
-            problem: &problem,
-            frame,
+    ) -> Problem<'a> {
+        Problem {
             surface: &self.surface,
-            prim: member.prim,
-            sides: cluster.walls(lane),
-        })
+            cluster,
+            lane,
+            any,
+            interval,
+        }
     }
 }

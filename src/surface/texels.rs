@@ -1,6 +1,7 @@
 //! Texels: as they are given, and as a map keeps them.
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
 
 use super::Wrap;
@@ -197,6 +198,27 @@ impl StoredTexels {
         }
     }
 
+    /// The texels at the corners (0,0) (1,0) (0,1) (1,1) of the cell at `index`, as stored.
+    #[inline(always)]
+    pub fn cell(&self, index: usize, stride: usize) -> [f32; 4] {
+        #[inline(always)]
+        fn corners<T: Texel>(t: &[T::Atomic], index: usize, stride: usize) -> [f32; 4] {
+            // One check for all four.
+            let t = &t[index..index + stride + 2];
+            [
+                T::load(&t[0]).into(),
+                T::load(&t[1]).into(),
+                T::load(&t[stride]).into(),
+                T::load(&t[stride + 1]).into(),
+            ]
+        }
+        match self {
+            Self::U8(t) => corners::<u8>(t, index, stride),
+            Self::U16(t) => corners::<u16>(t, index, stride),
+            Self::F32(t) => corners::<f32>(t, index, stride),
+        }
+    }
+
     /// Texel `index` as stored.
     #[inline(always)]
     pub fn get(&self, index: usize) -> f32 {
@@ -204,6 +226,23 @@ impl StoredTexels {
             Self::U8(t) => u8::load(&t[index]).into(),
             Self::U16(t) => u16::load(&t[index]).into(),
             Self::F32(t) => f32::load(&t[index]),
+        }
+    }
+
+    /// The smallest and largest of a run of texels, as stored; `None` for an empty one.
+    pub fn range(&self, run: Range<usize>) -> Option<(f32, f32)> {
+        fn range<T: Texel>(run: &[T::Atomic]) -> Option<(f32, f32)> {
+            let (mut low, mut high) = (T::load(run.first()?), T::load(run.first()?));
+            for h in run[1..].iter().map(T::load) {
+                low = if h < low { h } else { low };
+                high = if h > high { h } else { high };
+            }
+            Some((low.into(), high.into()))
+        }
+        match self {
+            Self::U8(t) => range::<u8>(&t[run]),
+            Self::U16(t) => range::<u16>(&t[run]),
+            Self::F32(t) => range::<f32>(&t[run]),
         }
     }
 

@@ -10,22 +10,26 @@
 use super::Problem;
 use super::pieces::{self, Line};
 use crate::prism::PrismHit;
-use crate::prism::curve::{Curve, End, Stretch, View};
+use crate::prism::curve::{Curve, Cut, End, Stretch, View};
 use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::{Lanes, Quad, Task};
-use crate::surface::{DisplacedSurface, Ruled};
+use crate::surface::{Patch, Ruled};
 
-/// Looks for the first wall of a prism on the ray, or for any.
-pub struct Walls<'a> {
-    /// The prism, and what is asked.
-    pub problem: &'a Problem<'a>,
-    pub frame: &'a RayFrame,
-    /// Whose walls.
-    pub surface: &'a DisplacedSurface,
-    /// The base triangle.
-    pub prim: u32,
-    /// Bit k: side k has a wall.
-    pub sides: u32,
+/// The first wall of the prism on the ray, or any.
+#[inline(always)]
+pub fn walls<L: Lanes>(problem: &Problem<'_>, frame: &RayFrame) -> Option<PrismHit> {
+    let patch = problem.patch();
+    L::outline(Walls {
+        problem,
+        frame,
+        patch: &patch,
+    })
+}
+
+struct Walls<'a> {
+    problem: &'a Problem<'a>,
+    frame: &'a RayFrame,
+    patch: &'a Patch<'a>,
 }
 
 /// Where the ray passes a side.
@@ -43,31 +47,18 @@ impl<L: Lanes> Task<L> for Walls<'_> {
 
     #[inline(always)]
     fn run(self) -> Option<PrismHit> {
-        let Problem { patch, offsets, .. } = *self.problem;
-        let reach = offsets[0].abs().max(offsets[1].abs());
-        let view = View::<L::Quad>::new(patch, self.frame, reach);
+        let Problem { cluster, lane, .. } = *self.problem;
+        let range = cluster.offsets(lane).map(f64::from);
+        let reach = range[0].abs().max(range[1].abs());
+        let view = View::<L::Quad>::new(&cluster.corners(lane, self.frame.axes), self.frame, reach);
         let mut nearest = None;
-        if pieces::is_edge_on(&view, offsets) {
-            let (heights, count) = pieces::planes_that_hold(patch, self.frame, offsets);
-            for &w in &heights[..count] {
-                if let Some(line) = Line::new(patch, self.frame, w) {
-                    self.meet(&passage(&line, 0), &mut nearest);
-                    self.meet(&passage(&line, 1), &mut nearest);
-                }
-            }
-            return nearest;
-        }
-        let stretches = view.stretches(offsets);
-        for stretch in stretches.as_slice() {
-            let ends = stretch.ends.map(|end| self.walled(end));
-            if ends == [None; 2] {
-                continue;
-            }
-            let curve = Curve::new(&view, patch, stretch, self.frame);
-            for (end, side) in ends.into_iter().enumerate() {
-                if let Some(side) = side {
-                    let passage = self.end(&curve, &view, stretch, end, side);
-                    self.meet(&passage, &mut nearest);
+        match view.cut(range) {
+            Cut::One(stretch) => self.along(&view, &stretch, &mut nearest),
+            _ if pieces::is_edge_on(&view, range) => self.edge_on(range, &mut nearest),
+            Cut::None => {}
+            Cut::Many => {
+                for stretch in view.stretches(range).as_slice() {
+                    self.along(&view, stretch, &mut nearest);
                 }
             }
         }
@@ -76,9 +67,41 @@ impl<L: Lanes> Task<L> for Walls<'_> {
 }
 
 impl Walls<'_> {
+    /// Bit k: side k has a wall.
+    #[inline(always)]
+    fn sides(&self) -> u32 {
+        self.problem.cluster.walls(self.problem.lane)
+    }
+
+    /// Both ends of a stretch.
+    #[inline(always)]
+    fn along<Q: Quad>(&self, view: &View<Q>, stretch: &Stretch, nearest: &mut Option<PrismHit>) {
+        let ends = [self.walled(stretch.ends[0]), self.walled(stretch.ends[1])];
+        if ends == [None; 2] {
+            return;
+        }
+        let curve = Curve::new(view, &self.patch.texels, stretch, self.frame);
+        for end in 0..2 {
+            if let Some(side) = ends[end] {
+                self.meet(&self.end(&curve, view, stretch, end, side), nearest);
+            }
+        }
+    }
+
+    /// Both ends of the lines through the flat triangles that hold the ray.
+    fn edge_on(&self, range: [f64; 2], nearest: &mut Option<PrismHit>) {
+        let (heights, count) = pieces::planes_that_hold(self.patch, self.frame, range);
+        for &w in &heights[..count] {
+            if let Some(line) = Line::new(self.patch, self.frame, w) {
+                self.meet(&passage(&line, 0), nearest);
+                self.meet(&passage(&line, 1), nearest);
+            }
+        }
+    }
+
     fn walled(&self, end: End) -> Option<u8> {
         match end {
-            End::Side(side) if self.sides >> side & 1 != 0 => Some(side),
+            End::Side(side) if self.sides() >> side & 1 != 0 => Some(side),
             _ => None,
         }
     }
@@ -94,7 +117,7 @@ impl Walls<'_> {
         side: u8,
     ) -> Passage {
         let w = stretch.w[end];
-        let patch = self.problem.patch;
+        let patch = self.patch;
         // Where A vanishes, the ray runs through the flat triangle at w.
         if pieces::is_flat(view, w)
             && let Some(line) = Line::new(patch, self.frame, w)
@@ -103,12 +126,12 @@ impl Walls<'_> {
             return passage(&line, end);
         }
         // The curve runs in the order of t, the stretch in that of w.
-        let s = if curve.w[0] == w { 0.0 } else { 1.0 };
-        let [_, _, u, v] = curve.at(s).0.to_array();
+        let at = usize::from(curve.w[0] != w);
+        let [_, _, u, v] = curve.at(at as f64).0.to_array();
         Passage {
             side,
             w,
-            t: curve.t(s),
+            t: curve.ends()[at],
             u,
             v,
         }
@@ -117,23 +140,29 @@ impl Walls<'_> {
     /// Keeps the wall that is passed, if it is one, is in the ray's interval, and is nearer.
     fn meet(&self, passage: &Passage, nearest: &mut Option<PrismHit>) {
         let &Passage { side, w, t, u, v } = passage;
-        if self.sides >> side & 1 == 0 || !self.problem.accepts(t) {
+        let Problem {
+            surface,
+            cluster,
+            lane,
+            ..
+        } = *self.problem;
+        if self.sides() >> side & 1 == 0 || !self.problem.accepts(t) {
             return;
         }
-        let Some((index, wall)) = self.surface.wall_on(self.prim, side) else {
+        let Some((index, wall)) = surface.wall_on(cluster.prim(lane), side) else {
             return;
         };
-        let ruled = Ruled::new(*self.problem.patch, wall);
+        let ruled = Ruled::new(*self.patch, wall);
         let place = ruled.place(u, v);
         let height = w * ruled.normal(place).length();
         let [other, own] = ruled.heights(place);
         // In units of the map's height, as the march has it.
-        let is_above = |d: f64| (height - d) * self.problem.patch.scale > 0.0;
+        let is_above = |d: f64| (height - d) * self.patch.scale > 0.0;
         if is_above(other) == is_above(own) {
             return;
         }
         let hit = PrismHit {
-            prim: self.surface.mesh().triangles().len() as u32 + index,
+            prim: surface.mesh().triangles().len() as u32 + index,
             t: t as f32,
             u: place as f32,
             v: ((height - other) / (own - other)).clamp(0.0, 1.0) as f32,
