@@ -101,8 +101,9 @@ pub(super) fn walls(
     let mut walls = Vec::new();
     for sides in edges(mesh).values() {
         match sides[..] {
-            [a, b] if bits(&a.of(mesh.corner_normals(a.triangle)))
-                == bits(&b.of(mesh.corner_normals(b.triangle))) =>
+            [a, b]
+                if bits(&a.of(mesh.corner_normals(a.triangle)))
+                    == bits(&b.of(mesh.corner_normals(b.triangle))) =>
             {
                 // Sides come by rising triangle: a's is the lower.
                 let own = a.of(texcoords(a.triangle));
@@ -217,7 +218,11 @@ impl<'m> Ruled<'m> {
         let normal = along.cross(self.normal(l)).normalize_or_zero();
         let inside = at(3 - a - b) - at(a);
         let away = normal.dot(inside) <= 0.0;
-        if away == own_is_higher { normal } else { -normal }
+        if away == own_is_higher {
+            normal
+        } else {
+            -normal
+        }
     }
 }
 
@@ -293,7 +298,7 @@ impl DisplacedSurface {
         let w = height / normal.length().max(Patch::LEAST_NORMAL);
         let (b1, b2) = ruled.barycentrics(l);
         let base = ruled.patch.base(b1, b2);
-        let outward = ruled.outward(l, w, own > other).as_vec3();
+        let outward = ruled.outward(l, w, own >= other).as_vec3();
         let [st0, st1, st2] = self.mesh.corner_texcoords(wall.triangle);
         SurfacePoint {
             position: (base + w * normal).as_vec3(),

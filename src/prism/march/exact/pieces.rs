@@ -175,7 +175,7 @@ impl Line {
         for k in 0..3 {
             let (i, j) = (q[(k + 1) % 3], q[(k + 2) % 3]);
             start[k] = i.perp_dot(j) / area;
-            change[k] = (i - j).perp_dot(d) / area;
+            change[k] = (j - i).perp_dot(d) / area;
             let root = -start[k] / change[k];
             if change[k] > 0.0 {
                 near = if root > near.0 { (root, k as u8) } else { near };

@@ -52,9 +52,12 @@ impl<L: Lanes> Task<L> for Walls<'_> {
         let reach = range[0].abs().max(range[1].abs());
         let view = View::<L::Quad>::new(&cluster.corners(lane, self.frame.axes), self.frame, reach);
         let mut nearest = None;
+        if pieces::is_edge_on(&view, range) {
+            self.edge_on(range, &mut nearest);
+            return nearest;
+        }
         match view.cut(range) {
             Cut::One(stretch) => self.along(&view, &stretch, &mut nearest),
-            _ if pieces::is_edge_on(&view, range) => self.edge_on(range, &mut nearest),
             Cut::None => {}
             Cut::Many => {
                 for stretch in view.stretches(range).as_slice() {
