@@ -30,7 +30,8 @@ use super::normals::weld;
 use super::{BaseMesh, DisplacedSurface, Patch, SurfacePoint, TexelRect, Wrap};
 
 /// What happens where displaced sheets part: at UV seams, hard edges and borders.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Seams {
     /// They part.
     #[default]
