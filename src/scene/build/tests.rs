@@ -198,9 +198,17 @@ fn seams_close_on_demand_and_only_for_the_exact_march() {
     assert_eq!(walls("march = \"exact\"\nseams = \"closed\""), 4);
     assert_eq!(walls("march = \"uniform\"\nseams = \"open\""), 0);
     for march in ["march = \"uniform\"", "dt = 2", "jitter = true"] {
-        let message = load(&format!("{march}\nseams = \"closed\"")).unwrap_err().to_string();
-        assert!(message.contains("displacement.seams") && message.contains("exact"), "{message}");
+        let message = load(&format!("{march}\nseams = \"closed\""))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("displacement.seams") && message.contains("exact"),
+            "{message}"
+        );
     }
     let step = load("march = \"exact\"\ndt = 2").unwrap_err().to_string();
-    assert!(step.contains("displacement.dt") && step.contains("uniform"), "{step}");
+    assert!(
+        step.contains("displacement.dt") && step.contains("uniform"),
+        "{step}"
+    );
 }

@@ -135,7 +135,10 @@ fn march(section: &mut super::Section) -> Result<March, SceneError> {
         if is_exact == Some(true)
             && let Some(item) = section.get(key)
         {
-            return Err(item.error("march = \"exact\"", "march = \"uniform\", whose key this is"));
+            return Err(item.error(
+                "march = \"exact\"",
+                "march = \"uniform\", whose key this is",
+            ));
         }
     }
     let step = step(section)?;

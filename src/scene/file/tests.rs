@@ -3,7 +3,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::*;
-use crate::prism::{March, Step};
+use crate::prism::March;
 use crate::surface::Wrap;
 
 fn parse(text: &str) -> Result<SceneFile, SceneError> {

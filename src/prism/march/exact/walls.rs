@@ -84,8 +84,8 @@ impl Walls<'_> {
             return;
         }
         let curve = Curve::new(view, &self.patch.texels, stretch, self.frame);
-        for end in 0..2 {
-            if let Some(side) = ends[end] {
+        for (end, side) in ends.into_iter().enumerate() {
+            if let Some(side) = side {
                 self.meet(&self.end(&curve, view, stretch, end, side), nearest);
             }
         }
