@@ -148,15 +148,10 @@ fn edit_all(surface: &Arc<DisplacedSurface>, contestants: &mut [Contestant]) -> 
 fn edited(surface: &DisplacedSurface, rect: Rect, height: u16) -> Arc<DisplacedSurface> {
     let map = surface.map();
     let (width, rows) = map.size();
-    let Texels::U16(stored) = map.texels() else {
+    let whole = prismarch::surface::TexelRect { x: 0, y: 0, width, height: rows };
+    let Ok(Texels::U16(mut texels)) = map.read(whole) else {
         panic!("the map of rock has 16 bits");
     };
-    let mut texels: Vec<u16> = stored
-        .chunks(map.stride())
-        .take(rows)
-        .flat_map(|row| &row[..width])
-        .copied()
-        .collect();
     for y in rect.start.1..rect.start.1 + rect.side {
         let first = y * width + rect.start.0;
         texels[first..first + rect.side].fill(height);

@@ -44,9 +44,9 @@ impl<L: Lanes> Pairs<L> {
             nearest = nearest.min(d0.min(d1));
             farthest = farthest.max(d0.max(d1));
             for axis in 0..2 {
-                let shear = zero - self.ray.shear[axis];
-                let a = depth.mul_add(shear, self.vertices[k][axis] - self.ray.origin[axis]);
-                let e = slope.mul_add(shear, self.normals[k][axis]);
+                let shear = self.ray.shear[axis];
+                let a = depth.neg_mul_add(shear, self.vertices[k][axis] - self.ray.origin[axis]);
+                let e = slope.neg_mul_add(shear, self.normals[k][axis]);
                 widest = widest.max(a.abs());
                 at_low[k][axis] = low.mul_add(e, a);
                 at_high[k][axis] = high.mul_add(e, a);
@@ -62,7 +62,10 @@ impl<L: Lanes> Pairs<L> {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             let first = cross(at_low[i], at_low[j]);
             let last = cross(at_high[i], at_high[j]);
-            let middle = (cross(at_low[i], at_high[j]) + cross(at_high[i], at_low[j])) * L::splat(0.5);
+            // Twice the middle coefficient.
+            let [p, q] = [at_high[i], at_low[j]];
+            let middle = p[1].neg_mul_add(q[0], p[0].mul_add(q[1], cross(at_low[i], at_high[j])));
+            let middle = middle * L::splat(0.5);
             inside = inside.min(first.max(last).max(middle));
             outside = outside.max(first.min(last).min(middle));
         }
@@ -80,5 +83,5 @@ impl<L: Lanes> Pairs<L> {
 
 #[inline(always)]
 fn cross<L: Lanes>(p: [L; 2], q: [L; 2]) -> L {
-    p[0] * q[1] - p[1] * q[0]
+    p[1].neg_mul_add(q[0], p[0] * q[1])
 }

@@ -83,6 +83,12 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        // SAFETY: FMA is there wherever an `Avx2` is.
+        Self(unsafe { _mm256_fnmadd_ps(self.0, a.0, b.0) })
+    }
+
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         // SAFETY: AVX is there wherever an `Avx2` is.
         Self(unsafe { _mm256_min_ps(self.0, other.0) })

@@ -91,6 +91,8 @@ pub(crate) trait Lanes:
     fn from_bits(bits: &[AtomicU32; LANES]) -> Self;
     /// self * a + b, fused where the machine can.
     fn mul_add(self, a: Self, b: Self) -> Self;
+    /// b - self * a, fused where the machine can.
+    fn neg_mul_add(self, a: Self, b: Self) -> Self;
     /// `other` where either is NaN.
     fn min(self, other: Self) -> Self;
     /// `other` where either is NaN.
@@ -193,17 +195,27 @@ impl<'m> Grid<'m> {
         }
     }
 
+    /// Whether a box of cells lies within the stored map, where nothing is folded.
+    #[inline(always)]
+    pub fn holds(&self, [i0, j0]: [f32; 2], [i1, j1]: [f32; 2]) -> bool {
+        i0.min(i1) >= 1.0
+            && j0.min(j1) >= 1.0
+            && i0.max(i1) <= self.size[0] - 3.0
+            && j0.max(j1) <= self.size[1] - 3.0
+    }
+
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), whole numbers within a few periods of
     /// the map, as the wrap mode continues it.
     #[inline(always)]
     pub fn corners<L: Lanes>(&self, i: L, j: L) -> [L; 4] {
+        if self.wrap == Wrap::Repeat {
+            let i = periodic(i, L::splat(self.size[0]));
+            let j = periodic(j, L::splat(self.size[1]));
+            return L::cell_corners(self, i, j);
+        }
         let (i, mirrored_x, flat_x) = self.fold_cell(i, self.size[0]);
         let (j, mirrored_y, flat_y) = self.fold_cell(j, self.size[1]);
-        let corners = L::cell_corners(self, i, j);
-        if self.wrap == Wrap::Repeat {
-            return corners;
-        }
-        let [h00, h10, h01, h11] = corners;
+        let [h00, h10, h01, h11] = L::cell_corners(self, i, j);
         // Before the first texel there is only the first: both corners are its.
         let h10 = flat_x.select_negative(h00, h10);
         let h11 = flat_x.select_negative(h01, h11);
@@ -369,6 +381,9 @@ mod tests {
             x.next_of(L::splat(0.5)).to_array(),
             [-2.0, 3.0, 9.0, -5.0, 6.0, 7.0, 8.0, 0.5]
         );
+        let two = L::splat(2.0);
+        let doubled = x.to_array().map(|x| 1.0 - 2.0 * x);
+        assert_eq!(x.neg_mul_add(two, L::splat(1.0)).to_array(), doubled);
         assert_eq!(x.abs().to_array(), x.to_array().map(f32::abs));
         let chosen = x.select_negative(L::splat(0.0), x);
         assert_eq!(chosen.to_array(), x.to_array().map(|x| x.max(0.0)));

@@ -84,8 +84,13 @@ impl Chord {
         let end = leaves_x.min(leaves_y).min(one);
         let length = (end - start).max(zero);
 
-        let [h00, h10, h01, h11] =
-            grid.corners(i + L::splat(i0 + base[0]), j + L::splat(j0 + base[1]));
+        let (i0, j0) = (i0 + base[0], j0 + base[1]);
+        let (column, row) = (i + L::splat(i0), j + L::splat(j0));
+        let [h00, h10, h01, h11] = if grid.holds([i0, j0], [i1 + base[0], j1 + base[1]]) {
+            L::cell_corners(grid, column, row)
+        } else {
+            grid.corners(column, row)
+        };
         let (bottom, left) = (h10 - h00, h01 - h00);
         let twist = (h11 - h01) - bottom;
         let (fx, fy) = (x - i, y - j);
@@ -94,15 +99,15 @@ impl Chord {
         let surface = fy.mul_add(left, fx.mul_add(slope_x, h00));
         let f0 = start.mul_add(L::splat(dh), L::splat(h0)) - surface;
         let (mx, my) = (length * L::splat(dx), length * L::splat(dy));
-        let f1 = length * L::splat(dh) - slope_x * mx - slope_y * my;
-        let f2 = zero - twist * mx * my;
+        let f1 = slope_y.neg_mul_add(my, slope_x.neg_mul_add(mx, length * L::splat(dh)));
+        let f2 = (twist * mx).neg_mul_add(my, zero);
 
         // With the sign at the start made positive: can f come within `off` of 0?
         let g0 = f0.abs() - L::splat(self.off);
         let g1 = f0.select_negative(zero - f1, f1);
         let g2 = f0.select_negative(zero - f2, f2);
         let at_end = g0 + g1 + g2;
-        let discriminant = g1 * g1 - L::splat(4.0) * g0 * g2;
+        let discriminant = (g0 * L::splat(4.0)).neg_mul_add(g2, g1 * g1);
         let crosses = g0.sign_mask() | at_end.sign_mask();
         // The parabola turns between the ends, upward, and has a root.
         let turns = g1.sign_mask()

@@ -46,6 +46,10 @@ pub struct Walker<'a, L: Lanes> {
     midlevel: f32,
     /// |n_i - n_j|^2 of the vertex pairs (0,1), (0,2), (1,2).
     spread: Vec3,
+    /// |n_1 - n_0| and |n_2 - n_0|.
+    turns: [f32; 2],
+    /// At least the largest 1/|N'|.
+    stretch: f32,
     /// (t(s) - t(0)) A: coefficients of 1 .. s^3.
     time: [f32; 4],
     /// tnear and tfar minus t(0), widened; and whether they cut anything off.
@@ -192,6 +196,8 @@ impl<'a, L: Lanes> Walker<'a, L> {
             height: [(w0 * per_world) as f32, (dw * per_world) as f32],
             midlevel: unit * displacement.midlevel,
             spread: Vec3::new(spread.x, spread.z, spread.y),
+            turns: [spread.x.sqrt(), spread.z.sqrt()],
+            stretch: 1.000_01 / (1.0 - spread.truncate().max_element() / 3.0).max(1e-6).sqrt(),
             cut,
             time: [0.0; 4],
             interval: [0.0; 2],
@@ -412,7 +418,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
             let off = bounds.bend * length * length + bounds.rounding;
             let mut slope = 0.0f32;
             for k in first..last {
-                slope = slope.max(ends.range[k]);
+                slope = slope.max(of(&ends.range, k));
             }
             let chord = Chord {
                 from: ends.point(first),
@@ -515,15 +521,15 @@ impl Span {
         let area = a0.abs() + a1.abs() + a2.abs();
         let rounding = (magnitude + largest * area) * (inverse * ROUNDING);
 
-        let (s01, s02) = (walker.spread.x.sqrt(), walker.spread.y.sqrt());
-        let shortest = (1.0 - walker.spread.max_element() / 3.0).max(1e-6).sqrt();
+        let ([s01, s02], stretch) = (walker.turns, walker.stretch);
         let turn = s01 * slope.z + s02 * slope.w;
-        let turn_bend = s01 * bend.z + s02 * bend.w + turn * turn / (2.0 * shortest);
+        let turn_bend = s01 * bend.z + s02 * bend.w + turn * turn * (0.5 * stretch);
         let [h0, h1] = self.height;
         let highest = h0.abs().max((h0 + h1).abs());
         let height_bend = highest * turn_bend + h1.abs() * turn;
-        let height_rounding = highest * (s01 * rounding.z + s02 * rounding.w) / shortest
-            + ROUNDING * (highest / shortest + walker.midlevel.abs());
+        let highest = highest * stretch;
+        let height_rounding = highest * (s01 * rounding.z + s02 * rounding.w)
+            + ROUNDING * (highest + walker.midlevel.abs());
         Bounds {
             reach: slope.x.max(slope.y),
             bend: 0.25 * bend.x.max(bend.y),
@@ -534,17 +540,20 @@ impl Span {
     }
 }
 
+/// One number for each end of up to 15 children.
+type Row = [[f32; LANES]; 2];
+
 /// The ends of up to 15 children.
 struct Ends {
     children: usize,
-    x: [f32; 16],
-    y: [f32; 16],
-    h: [f32; 16],
+    x: Row,
+    y: Row,
+    h: Row,
     /// Texel cells of (x, y).
-    i: [f32; 16],
-    j: [f32; 16],
+    i: Row,
+    j: Row,
     /// Largest minus smallest stored texel around each child.
-    range: [f32; 16],
+    range: Row,
 }
 
 impl Ends {
@@ -556,39 +565,38 @@ impl Ends {
         h: &[L; R],
         range: &[L; R],
     ) -> Self {
-        let mut ends = Self {
+        // Of one register the second copy is never looked at.
+        let last = R - 1;
+        Self {
             children,
-            x: [0.0; 16],
-            y: [0.0; 16],
-            h: [0.0; 16],
-            i: [0.0; 16],
-            j: [0.0; 16],
-            range: [0.0; 16],
-        };
-        for r in 0..R {
-            ends.x[8 * r..8 * r + 8].copy_from_slice(&x[r].to_array());
-            ends.y[8 * r..8 * r + 8].copy_from_slice(&y[r].to_array());
-            ends.h[8 * r..8 * r + 8].copy_from_slice(&h[r].to_array());
-            ends.i[8 * r..8 * r + 8].copy_from_slice(&x[r].floor().to_array());
-            ends.j[8 * r..8 * r + 8].copy_from_slice(&y[r].floor().to_array());
-            ends.range[8 * r..8 * r + 8].copy_from_slice(&range[r].to_array());
+            x: [x[0].to_array(), x[last].to_array()],
+            y: [y[0].to_array(), y[last].to_array()],
+            h: [h[0].to_array(), h[last].to_array()],
+            i: [x[0].floor().to_array(), x[last].floor().to_array()],
+            j: [y[0].floor().to_array(), y[last].floor().to_array()],
+            range: [range[0].to_array(), range[last].to_array()],
         }
-        ends
     }
 
     #[inline(always)]
     fn point(&self, k: usize) -> [f32; 3] {
-        [self.x[k], self.y[k], self.h[k]]
+        [of(&self.x, k), of(&self.y, k), of(&self.h, k)]
     }
 
     #[inline(always)]
     fn cell(&self, k: usize) -> [f32; 2] {
-        [self.i[k], self.j[k]]
+        [of(&self.i, k), of(&self.j, k)]
     }
 
     /// Texel cells that the chord from end `a` to end `b` crosses.
     #[inline(always)]
     fn cells(&self, a: usize, b: usize) -> f32 {
-        (self.i[b] - self.i[a]).abs() + (self.j[b] - self.j[a]).abs() + 1.0
+        let ([i0, j0], [i1, j1]) = (self.cell(a), self.cell(b));
+        (i1 - i0).abs() + (j1 - j0).abs() + 1.0
     }
+}
+
+#[inline(always)]
+fn of(row: &Row, k: usize) -> f32 {
+    row.as_flattened()[k & 15]
 }
