@@ -6,7 +6,8 @@ use glam::Vec3;
 
 use crate::trace::{Hit, World};
 
-/// The columns. `mesh` counts the objects of the scene, `prim` the triangles of that mesh, both from 0.
+/// The columns. `mesh` counts the objects of the scene, `prim` the triangles of that mesh, both from 0; walls of closed
+/// seams come after the triangles.
 pub const HEADER: &str = "hit,t,mesh,prim,u,v,px,py,pz,ngx,ngy,ngz,nsx,nsy,nsz,displacement\n";
 
 /// A ray that hits nothing: zeros throughout.

@@ -2,6 +2,7 @@
 
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::ValueEnum;
 use rayon::prelude::*;
@@ -14,7 +15,7 @@ use super::rays::{Layout, RayError, RayReader, Row};
 use crate::image::{Channel, atomic};
 use crate::prism::{March, Step};
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
-use crate::surface::{Displacement, Projection, UvTransform, Wrap};
+use crate::surface::{DisplacedSurface, Displacement, Projection, Seams, UvTransform, Wrap};
 use crate::trace::World;
 
 /// Trace rays from a CSV table and write their hits
@@ -48,6 +49,9 @@ pub struct Args {
     /// Shift the steps of each ray at random (thin-feature sampling)
     #[arg(long, value_name = "SEED")]
     jitter: Option<u32>,
+    /// UV seams, hard edges and borders: left open, or closed by walls (exact march only) [default: the scene's, or open]
+    #[arg(long, value_enum)]
+    seams: Option<SeamKind>,
     /// Table of rays, - for standard input
     #[arg(long, value_name = "RAYS.csv")]
     rays: PathBuf,
@@ -125,6 +129,23 @@ enum WrapKind {
     Mirror,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SeamKind {
+    /// Displaced sheets part
+    Open,
+    /// Walls join them
+    Closed,
+}
+
+impl From<SeamKind> for Seams {
+    fn from(kind: SeamKind) -> Self {
+        match kind {
+            SeamKind::Open => Self::Open,
+            SeamKind::Closed => Self::Closed,
+        }
+    }
+}
+
 impl From<WrapKind> for Wrap {
     fn from(kind: WrapKind) -> Self {
         match kind {
@@ -147,6 +168,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut loaded = args.load()?;
     super::warn(&loaded.warnings);
     args.override_march(&mut loaded.scene)?;
+    args.override_seams(&mut loaded.scene);
     let world = loaded.scene.world()?;
     let engine = args.engine.build(&world)?;
     let query = Query {
@@ -203,6 +225,17 @@ impl Args {
             _ => Err(CliError::Usage(
                 "either SCENE or --mesh, --map and --scale are needed".into(),
             )),
+        }
+    }
+
+    /// What the command line says of seams wins over the scene.
+    fn override_seams(&self, scene: &mut Scene) {
+        let Some(seams) = self.seams else { return };
+        for object in &mut scene.objects {
+            if let ObjectShape::Displaced(surface, _) = &mut object.shape {
+                let other = DisplacedSurface::clone(surface).with_seams(seams.into());
+                *surface = Arc::new(other);
+            }
         }
     }
 

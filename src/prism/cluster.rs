@@ -3,7 +3,7 @@
 //! A ray is tested against all eight in one set of lanes ([`cull`](super::cull)), so that a backend's tree has an eighth of the leaves
 //! and makes a fraction of the calls. 27 floats hold a prism: corners (9), vertex normals (9), texture coordinates after
 //! the UV transform (6), the range of w = D/|N'| (2), and the base triangle's number with its flags (1): 108 bytes per base
-//! triangle.
+//! triangle. A flag for each side tells of a wall there, where seams are closed; the walls are the surface's.
 //!
 //! Corners, normals and texture coordinates are the mesh's own digits: what two prisms share, they share bit for bit.
 
@@ -31,8 +31,11 @@ const _: () = assert!(size_of::<Cluster>() == 108 * LANES);
 /// In [`Cluster::prims`]: t is not monotone in w.
 const FOLDED: u32 = 1 << 31;
 
+/// In [`Cluster::prims`]: side k has a wall, for bit k of three from this one on.
+const WALLS: u32 = 27;
+
 /// Base triangles that can be numbered.
-pub const MOST_PRISMS: usize = 1 << 30;
+pub const MOST_PRISMS: usize = 1 << WALLS;
 
 /// Base triangles whose texels reach further than this are [`LONG`].
 const LONG_TEXELS: f64 = 4096.0;
@@ -88,6 +91,9 @@ impl Cluster {
             if (b - a).abs().max((c - a).abs()).max_element() > LONG_TEXELS {
                 cluster.prims[l] |= LONG;
             }
+            for wall in surface.walls_of(prim) {
+                cluster.prims[l] |= 1 << (WALLS + u32::from(wall.side));
+            }
         }
         cluster
     }
@@ -95,7 +101,13 @@ impl Cluster {
     /// Base triangle of a lane.
     #[inline(always)]
     pub fn prim(&self, lane: usize) -> u32 {
-        self.prims[lane] & !(FOLDED | LONG)
+        self.prims[lane] & (MOST_PRISMS as u32 - 1)
+    }
+
+    /// The sides of a lane with walls: bit k for side k.
+    #[inline(always)]
+    pub fn walls(&self, lane: usize) -> u32 {
+        self.prims[lane] >> WALLS & 0b111
     }
 
     /// The range of w of a lane.

@@ -1,11 +1,11 @@
 //! Prisms for the exact march: clusters of eight, and the hit test of one cluster.
 
-use super::cluster::{Cluster, groups};
+use super::cluster::{Cluster, MOST_PRISMS, groups};
 use super::cull::Pairs;
-use super::march::exact::{Found, Problem, root, search};
+use super::march::exact::{Found, Problem, root, search, walls};
 use super::ray_frame::{RayFrame, RayLanes, axes};
 use super::simd::{LANES, Lanes};
-use super::{Parts, PrismHit, Prisms};
+use super::{MarchError, Parts, PrismHit, Prisms};
 use crate::ray::Ray;
 use crate::surface::DisplacedSurface;
 
@@ -17,22 +17,28 @@ pub struct ExactPrisms {
 }
 
 impl ExactPrisms {
-    pub fn new(surface: &DisplacedSurface) -> Self {
+    pub fn new(surface: &DisplacedSurface) -> Result<Self, MarchError> {
         let prims = surface.mesh().triangles().len();
+        if prims > MOST_PRISMS {
+            return Err(MarchError::TooManyTriangles {
+                found: prims,
+                max: MOST_PRISMS,
+            });
+        }
         let centroids: Vec<_> = (0..prims as u32)
             .map(|prim| {
                 let [a, b, c] = surface.mesh().corners(prim).map(|p| p.as_dvec3());
                 a + b + c
             })
             .collect();
-        let offsets = |prim| surface.patch(prim).offsets();
-        Self {
+        let offsets = |prim| surface.offsets(prim);
+        Ok(Self {
             clusters: groups(&centroids)
                 .chunks(LANES)
                 .map(|prims| Cluster::new(surface, prims, offsets))
                 .collect(),
             prims,
-        }
+        })
     }
 
     /// Prisms in a cluster: its first lanes.
@@ -56,6 +62,7 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     let frame = RayFrame::new(ray, axes);
     let mut interval = [ray.tnear, ray.tfar];
     let mut nearest: Option<(Found, usize)> = None;
+    let mut wall: Option<PrismHit> = None;
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
@@ -70,6 +77,19 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
                 interval[1] = (found.t as f32).next_up().min(ray.tfar);
             }
         }
+        if cluster.walls(lane) != 0
+            && let Some(found) = walls::<L>(&prisms.problem(cluster, lane, interval, false), &frame)
+            && wall.is_none_or(|best| found.is_before(&best))
+        {
+            wall = Some(found);
+            interval[1] = found.t.next_up().min(ray.tfar);
+        }
+    }
+    // Of two at the same t the surface.
+    if let Some(wall) = wall
+        && nearest.is_none_or(|(found, _)| wall.t < found.t as f32)
+    {
+        return Some(wall);
     }
     let (found, lane) = nearest?;
     let problem = prisms.problem(cluster, lane, interval, false);
@@ -93,6 +113,7 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
         alive &= alive - 1;
         let problem = prisms.problem(cluster, lane, [ray.tnear, ray.tfar], true);
         if search::<L>(&problem, &frame).is_some()
+            || cluster.walls(lane) != 0 && walls::<L>(&problem, &frame).is_some()
         {
             return true;
         }

@@ -18,6 +18,8 @@ mod march;
 mod normal;
 mod path;
 mod ray_frame;
+#[cfg(test)]
+mod seam_tests;
 mod sides;
 mod simd;
 #[cfg(test)]
@@ -29,7 +31,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use crate::ray::{Aabb, Ray};
-use crate::surface::{DisplacedSurface, SurfacePoint};
+use crate::surface::{DisplacedSurface, Seams, SurfacePoint};
 use exact::ExactPrisms;
 use kernel::Kernel;
 use uniform::UniformPrisms;
@@ -40,16 +42,24 @@ pub use simd::SimdLevel;
 /// Where a ray first meets the surface inside one prism.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrismHit {
-    /// Base triangle.
+    /// Base triangle; or, on a wall of closed [`Seams`], the number of base triangles plus the index into
+    /// [`DisplacedSurface::walls`].
     pub prim: u32,
     /// Ray parameter.
     pub t: f32,
-    /// Barycentric coordinate of vertex 1.
+    /// Barycentric coordinate of vertex 1; on a wall 0 to 1 along its edge, from its first corner in the triangle's order.
     pub u: f32,
-    /// Barycentric coordinate of vertex 2.
+    /// Barycentric coordinate of vertex 2; on a wall 0 at its other height, 1 at its triangle's own.
     pub v: f32,
-    /// Geometric normal of S, unit, on the base mesh's outer side.
+    /// Geometric normal of S, unit, on the base mesh's outer side; on a wall on the solid's outer side.
     pub ng: Vec3,
+}
+
+impl PrismHit {
+    /// Nearer, or at the same t on a primitive of a lower number.
+    fn is_before(&self, other: &Self) -> bool {
+        self.t < other.t || self.t == other.t && self.prim < other.prim
+    }
 }
 
 /// A displaced surface as a set of prisms, one per base triangle: what a backend traces.
@@ -68,10 +78,18 @@ enum Parts {
 
 impl Prisms {
     /// Builds the prisms; the kernel is chosen once, for this machine.
+    ///
+    /// # Errors
+    ///
+    /// A step that is no positive number; closed [`Seams`] with the uniform march; more base triangles than the exact
+    /// march can number (2^28).
     pub fn new(surface: Arc<DisplacedSurface>, march: March) -> Result<Self, MarchError> {
         let march = march.validate()?;
         let parts = match march {
-            March::Exact => Parts::Exact(ExactPrisms::new(&surface)),
+            March::Exact => Parts::Exact(ExactPrisms::new(&surface)?),
+            March::Uniform { .. } if surface.seams() == Seams::Closed => {
+                return Err(MarchError::SeamsNeedExact);
+            }
             March::Uniform { .. } => Parts::Uniform(UniformPrisms::new(&surface)),
         };
         Ok(Self {
@@ -116,12 +134,14 @@ impl Prisms {
         self.len() == 0
     }
 
-    /// Bytes beside mesh and map: 108 per base triangle (the exact march's go in groups of eight).
+    /// Bytes beside mesh and map: 108 per base triangle (the exact march's go in groups of eight), and 28 per wall where
+    /// seams are closed.
     pub fn bytes(&self) -> usize {
-        match &self.parts {
+        let prisms = match &self.parts {
             Parts::Exact(exact) => size_of_val(&exact.clusters[..]),
             Parts::Uniform(uniform) => size_of_val(&uniform.records[..]),
-        }
+        };
+        prisms + size_of_val(self.surface.walls())
     }
 
     /// Conservative bounds of what one traced primitive holds of the surface.
@@ -176,8 +196,12 @@ impl Prisms {
         self.kernel.occluded(self, primitive, ray)
     }
 
-    /// All a shader wants to know of the point (u, v) over base triangle `prim`.
+    /// All a shader wants to know of the point (u, v) over base triangle `prim`, or on a wall: see [`PrismHit`].
     pub fn point(&self, prim: u32, u: f32, v: f32) -> SurfacePoint {
+        let triangles = self.surface.mesh().triangles().len();
+        if let Some(wall) = (prim as usize).checked_sub(triangles) {
+            return self.surface.wall_point(wall, u, v);
+        }
         let patch = self.surface.patch(prim);
         let (bu, bv) = (f64::from(u), f64::from(v));
         let point = patch.point(bu, bv);

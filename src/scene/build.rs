@@ -23,7 +23,7 @@ use crate::image::{Channel, ColorSpace};
 use crate::prism::March;
 use crate::surface::{
     BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Projection,
-    UvTransform, Wrap,
+    Seams, UvTransform, Wrap,
 };
 use assets::Assets;
 
@@ -103,7 +103,7 @@ impl Loaded {
         let material = builder.default_material();
         builder.objects.push(SceneObject {
             name,
-            shape: ObjectShape::Displaced(surface, source.march),
+            shape: ObjectShape::Displaced(Arc::new(surface), source.march),
             instances: Vec::new(),
             mask: u32::MAX,
             material,
@@ -168,13 +168,7 @@ impl Builder {
             let mesh = self
                 .base_mesh(path, &name, part.mesh, &shaping)
                 .map_err(asset)?;
-            let shape = match &table.displacement {
-                Some(displacement) => {
-                    let by_file = part.material.as_ref().and_then(|m| m.displacement.as_ref());
-                    self.displaced(&table.file, displacement, by_file, &name, mesh)?
-                }
-                None => ObjectShape::Plain(mesh),
-            };
+            let by_file = part.material.as_ref().and_then(|m| m.displacement.clone());
             let material = match (named, part.material) {
                 (Some(index), _) => index,
                 (None, Some(material)) => match of_file.entry(material.name.clone()) {
@@ -184,6 +178,18 @@ impl Builder {
                     }
                 },
                 (None, None) => self.default_material(),
+            };
+            let shape = match &table.displacement {
+                Some(displacement) => {
+                    let seams = displacement.seams.unwrap_or_else(|| {
+                        default_seams(&self.materials[material], displacement.march)
+                    });
+                    let surface =
+                        self.displaced(&table.file, displacement, by_file.as_ref(), &name, mesh)?;
+                    let surface = Arc::new(surface.with_seams(seams));
+                    ObjectShape::Displaced(surface, displacement.march)
+                }
+                None => ObjectShape::Plain(mesh),
             };
             self.objects.push(SceneObject {
                 name,
@@ -238,7 +244,7 @@ impl Builder {
         by_file: Option<&FileDisplacement>,
         name: &str,
         mesh: Arc<BaseMesh>,
-    ) -> Result<ObjectShape, SceneError> {
+    ) -> Result<DisplacedSurface, SceneError> {
         let by_file = by_file.filter(|_| table.map.is_none());
         let (path, at) = match (&table.map, by_file) {
             (Some(map), _) => (&map.value, map),
@@ -272,8 +278,7 @@ impl Builder {
             .assets
             .heights(path, &channel, wrap.unwrap_or_default())
             .map_err(|e| at.asset(e))?;
-        let surface = displaced(name, mesh, &map, displacement).map_err(|e| file.asset(e))?;
-        Ok(ObjectShape::Displaced(surface, table.march))
+        displaced(name, mesh, &map, displacement).map_err(|e| file.asset(e))
     }
 
     /// The index of the material that the scene names.
@@ -426,13 +431,20 @@ fn displaced(
     mesh: Arc<BaseMesh>,
     map: &Arc<DisplacementMap>,
     displacement: Displacement,
-) -> Result<Arc<DisplacedSurface>, AssetError> {
-    DisplacedSurface::new(mesh, map.clone(), displacement)
-        .map(Arc::new)
-        .map_err(|source| AssetError::Surface {
-            part: part.to_owned(),
-            source,
-        })
+) -> Result<DisplacedSurface, AssetError> {
+    DisplacedSurface::new(mesh, map.clone(), displacement).map_err(|source| AssetError::Surface {
+        part: part.to_owned(),
+        source,
+    })
+}
+
+/// Closed where rays go through the material, so that solids stay solid, if the march sees walls; else open.
+fn default_seams(material: &Material, march: March) -> Seams {
+    if material.is_transmissive() && march == March::Exact {
+        Seams::Closed
+    } else {
+        Seams::Open
+    }
 }
 
 fn stem(path: &Path) -> String {

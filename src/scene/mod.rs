@@ -97,6 +97,13 @@ pub struct Material {
     pub specular: f32,
 }
 
+impl Material {
+    /// Whether rays go through. None does yet: all materials of this subset are opaque.
+    pub fn is_transmissive(&self) -> bool {
+        false
+    }
+}
+
 /// A source of light.
 #[derive(Clone, Debug)]
 pub enum Light {

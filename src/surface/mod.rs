@@ -19,6 +19,7 @@ mod normals;
 mod patch;
 mod projection;
 mod pyramid;
+mod seams;
 mod texels;
 mod uv;
 
@@ -32,5 +33,7 @@ pub use projection::Projection;
 pub(crate) use pyramid::Entries;
 pub use pyramid::{Level, Pyramid};
 pub(crate) use texels::{StoredTexels, Texel};
+pub(crate) use seams::Ruled;
+pub use seams::{Seams, Wall};
 pub use texels::{TexelKind, Texels};
 pub use uv::{UvTransform, Wrap};

@@ -60,7 +60,7 @@ pub(super) fn smooth(positions: &[Vec3], triangles: &[[u32; 3]], crease_angle: f
 }
 
 /// For each vertex the first one at the same position.
-fn weld(positions: &[Vec3]) -> Vec<u32> {
+pub(super) fn weld(positions: &[Vec3]) -> Vec<u32> {
     let mut first = HashMap::with_capacity(positions.len());
     positions
         .iter()

@@ -71,7 +71,11 @@ impl Patch<'_> {
 
     /// The range of w = D/|N'| over the triangle, conservative, and never empty.
     pub fn offsets(&self) -> [f32; 2] {
-        let [low, high] = self.range();
+        self.offsets_over(self.range())
+    }
+
+    /// The range of w for D in this range.
+    pub(super) fn offsets_over(&self, [low, high]: [f64; 2]) -> [f32; 2] {
         let [a, b, c] = self.vertices;
         let size = (b - a).abs().max((c - a).abs()).max_element();
         let slack = 1e-6 * (low.abs().max(high.abs()) + size);

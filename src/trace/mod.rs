@@ -22,7 +22,7 @@ pub struct Hit {
     pub u: f32,
     /// Barycentric coordinate of vertex 2.
     pub v: f32,
-    /// Base triangle.
+    /// Base triangle; or a wall, on which u and v mean something else: see [`PrismHit`](crate::prism::PrismHit).
     pub prim: u32,
     /// Geometry within its scene: for instanced objects always 0, else the index into [`World::top_level`].
     pub geom: u32,

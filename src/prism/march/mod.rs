@@ -36,12 +36,29 @@ impl Default for March {
     }
 }
 
-/// Why a march was refused.
+/// Why a march, or a surface for it, was refused.
 #[derive(Debug, thiserror::Error, PartialEq)]
-#[error("the march step is {found}; expected a finite number greater than 0")]
-pub struct MarchError {
-    /// The step that was given.
-    pub found: f32,
+pub enum MarchError {
+    /// A step that does not go forward.
+    #[error("the march step is {found}; expected a finite number greater than 0")]
+    BadStep {
+        /// The step that was given.
+        found: f32,
+    },
+    /// The uniform march sees no walls.
+    #[error(
+        "the surface's seams are closed, and the uniform march sees no walls; \
+         leave them open (seams = \"open\"), or take the exact march (march = \"exact\")"
+    )]
+    SeamsNeedExact,
+    /// More base triangles than the exact march's records can number.
+    #[error("the mesh has {found} triangles; the exact march takes at most {max}")]
+    TooManyTriangles {
+        /// Base triangles.
+        found: usize,
+        /// Most that are supported.
+        max: usize,
+    },
 }
 
 impl March {
@@ -57,7 +74,7 @@ impl March {
         if found.is_finite() && found > 0.0 {
             Ok(self)
         } else {
-            Err(MarchError { found })
+            Err(MarchError::BadStep { found })
         }
     }
 }

@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn avx2() {
         if super::super::SimdLevel::Avx2.is_supported() {
-            keeps_its_word::<super::super::avx2::Avx2Quad>();
+            keeps_its_word::<super::super::avx2_quad::Avx2Quad>();
         }
     }
 }

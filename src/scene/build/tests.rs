@@ -182,3 +182,33 @@ fn texture_coordinates_are_made_on_demand() {
         }
     }
 }
+
+#[test]
+fn seams_close_on_demand_and_only_for_the_exact_march() {
+    let folder = folder();
+    let load = |keys: &str| {
+        let mesh = "[[mesh]]\nfile = \"two.obj\"\n[mesh.displacement]\nscale = 0.5\n";
+        load(&folder, &format!("{mesh}{keys}\n"))
+    };
+    let walls = |keys: &str| surface(&load(keys).unwrap().scene.objects[0]).walls().len();
+    assert_eq!(walls(""), 0);
+    assert_eq!(walls("seams = \"open\""), 0);
+    // The border of a square.
+    assert_eq!(walls("seams = \"closed\""), 4);
+    assert_eq!(walls("march = \"exact\"\nseams = \"closed\""), 4);
+    assert_eq!(walls("march = \"uniform\"\nseams = \"open\""), 0);
+    for march in ["march = \"uniform\"", "dt = 2", "jitter = true"] {
+        let message = load(&format!("{march}\nseams = \"closed\""))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("displacement.seams") && message.contains("exact"),
+            "{message}"
+        );
+    }
+    let step = load("march = \"exact\"\ndt = 2").unwrap_err().to_string();
+    assert!(
+        step.contains("displacement.dt") && step.contains("uniform"),
+        "{step}"
+    );
+}

@@ -7,7 +7,7 @@ use glam::{Affine3A, EulerRot, Quat, Vec3};
 use super::{Item, Keyed, STEP_TEXELS, SceneError, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
 use crate::prism::{March, Step};
-use crate::surface::{Projection, UvTransform, Wrap};
+use crate::surface::{Projection, Seams, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
 pub(in crate::scene) const SCALE: &str =
@@ -54,6 +54,8 @@ pub(in crate::scene) struct DisplacementTable {
     pub wrap: Option<Wrap>,
     pub uv: Option<UvTransform>,
     pub march: March,
+    /// Default: what the material needs.
+    pub seams: Option<Seams>,
 }
 
 impl MeshTable {
@@ -109,12 +111,9 @@ impl DisplacementTable {
         let this = keyed(&item, ());
         let mut section = item.section(&[
             "map", "channel", "scale", "midlevel", "wrap", "uv", "march", "dt", "dt_world",
-            "jitter",
+            "jitter", "seams",
         ])?;
-        // There is one march so far: the word is checked, and says nothing else.
-        section.optional("march", |i| i.word(&[("uniform", ())]))?;
-        let step = step(&mut section)?;
-        let jitter = section.optional("jitter", |i| i.boolean())?;
+        let march = march(&mut section)?;
         Ok(Self {
             this,
             map: section.optional("map", |i| file_path(&i, folder))?,
@@ -123,12 +122,49 @@ impl DisplacementTable {
             midlevel: section.optional("midlevel", |i| i.number("a height", |_| true))?,
             wrap: section.optional("wrap", wrap)?,
             uv: section.optional("uv", uv_transform)?,
-            march: March::Uniform {
-                step,
-                jitter: jitter.unwrap_or(false),
-            },
+            march,
+            seams: seams(&mut section, march)?,
         })
     }
+}
+
+/// The march that is named; else the uniform one where its step or jitter are given, and the exact one otherwise.
+fn march(section: &mut super::Section) -> Result<March, SceneError> {
+    let is_exact = section.optional("march", |i| i.word(&[("exact", true), ("uniform", false)]))?;
+    for key in ["dt", "dt_world", "jitter"] {
+        if is_exact == Some(true)
+            && let Some(item) = section.get(key)
+        {
+            return Err(item.error(
+                "march = \"exact\"",
+                "march = \"uniform\", whose key this is",
+            ));
+        }
+    }
+    let step = step(section)?;
+    let jitter = section.optional("jitter", |i| i.boolean())?;
+    if is_exact.unwrap_or(step.is_none() && jitter.is_none()) {
+        return Ok(March::Exact);
+    }
+    Ok(March::Uniform {
+        step: step.unwrap_or(Step::Texels(1.0)),
+        jitter: jitter.unwrap_or(false),
+    })
+}
+
+fn seams(section: &mut super::Section, march: March) -> Result<Option<Seams>, SceneError> {
+    let Some(item) = section.get("seams") else {
+        return Ok(None);
+    };
+    let no_walls = item.error(
+        "\"closed\" with the uniform march, which sees no walls",
+        "\"open\", or march = \"exact\"",
+    );
+    let seams = item.word(&[("open", Seams::Open), ("closed", Seams::Closed)])?;
+    if seams == Seams::Closed && march != March::Exact {
+        return Err(no_walls);
+    }
+    Ok(Some(seams))
 }
 
 fn channel(item: Item) -> Result<Channel, SceneError> {
@@ -137,21 +173,21 @@ fn channel(item: Item) -> Result<Channel, SceneError> {
     Ok(channel)
 }
 
-/// `dt` or `dt_world`; 1 texel by default.
-fn step(section: &mut super::Section) -> Result<Step, SceneError> {
+/// `dt` or `dt_world`.
+fn step(section: &mut super::Section) -> Result<Option<Step>, SceneError> {
     let texels = section.optional("dt", |i| {
         let (low, high) = (STEP_TEXELS.start(), STEP_TEXELS.end());
         let expected = format!("texels per step, from {low} to {high}");
         i.number(&expected, |x| STEP_TEXELS.contains(&x))
     })?;
     let Some(item) = section.get("dt_world") else {
-        return Ok(Step::Texels(texels.unwrap_or(1.0)));
+        return Ok(texels.map(Step::Texels));
     };
     if texels.is_some() {
         return Err(item.error("dt and dt_world", "only one of them"));
     }
     let length = item.number("world units per step, above 0", |x| x > 0.0)?;
-    Ok(Step::World(length))
+    Ok(Some(Step::World(length)))
 }
 
 fn instances(item: Item) -> Result<Vec<Affine3A>, SceneError> {

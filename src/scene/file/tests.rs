@@ -3,7 +3,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::*;
-use crate::prism::{March, Step};
+use crate::prism::March;
 use crate::surface::Wrap;
 
 fn parse(text: &str) -> Result<SceneFile, SceneError> {
@@ -45,11 +45,7 @@ fn the_documented_defaults_are_the_defaults() {
     assert_eq!(mesh.file.value, Path::new("folder/a.obj"));
     assert_eq!((mesh.mask, mesh.instances.len()), (u32::MAX, 0));
     let displacement = mesh.displacement.as_ref().unwrap();
-    let march = March::Uniform {
-        step: Step::Texels(1.0),
-        jitter: false,
-    };
-    assert_eq!(displacement.march, march);
+    assert_eq!((displacement.march, displacement.seams), (March::Exact, None));
     let material = &bare.materials[0];
     assert_eq!(
         (material.metallic, material.roughness, material.specular),

@@ -12,6 +12,7 @@ mod cells;
 mod pieces;
 mod signs;
 mod span;
+mod walls;
 
 use super::polish::Root;
 use crate::prism::cluster::Cluster;
@@ -22,6 +23,7 @@ use crate::surface::{DisplacedSurface, Patch};
 use pieces::Piece;
 use signs::Signs;
 use span::Walker;
+pub use walls::walls;
 
 /// One prism of a cluster, and what is asked of it.
 #[derive(Clone, Copy)]

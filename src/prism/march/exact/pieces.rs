@@ -53,6 +53,12 @@ pub fn is_edge_on<Q: Quad>(view: &View<Q>, [low, high]: [f64; 2]) -> bool {
     most <= EDGE_ON * view.width * view.width
 }
 
+/// Whether A vanishes at w.
+pub fn is_flat<Q: Quad>(view: &View<Q>, w: f64) -> bool {
+    let [c0, c1, c2] = view.area();
+    (c0 + w * (c1 + w * c2)).abs() <= EDGE_ON * view.width * view.width
+}
+
 /// A piece of a stretch.
 pub enum Piece<Q> {
     /// A is nearly constant.
@@ -144,60 +150,98 @@ fn in_world(frame: &RayFrame) -> (DVec3, DVec3) {
     (origin, direction)
 }
 
-/// The curve of a ray that lies in the plane of the offset triangle at w, in the order of t: straight, with A = 1.
-pub fn flat<Q: Quad>(patch: &Patch<'_>, frame: &RayFrame, w: f64) -> Option<Curve<Q>> {
-    let (origin, direction) = in_world(frame);
-    let p = corners(patch, origin, w);
-    let normal = (p[1] - p[0]).cross(p[2] - p[0]);
-    // Seen along the axis that the triangle faces most.
-    let main = normal.abs().max_position();
-    let seen = |v: DVec3| DVec2::new(v[(main + 1) % 3], v[(main + 2) % 3]);
-    let (q, d) = (p.map(seen), seen(direction));
-    let area = (q[1] - q[0]).perp_dot(q[2] - q[0]);
-    // b_k at depth z is a_k + z e_k.
-    let (mut a, mut e) = ([0.0; 3], [0.0; 3]);
-    let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
-    for k in 0..3 {
-        let (i, j) = (q[(k + 1) % 3], q[(k + 2) % 3]);
-        a[k] = i.perp_dot(j) / area;
-        e[k] = (i - j).perp_dot(d) / area;
-        let root = -a[k] / e[k];
-        if e[k] > 0.0 {
-            near = near.max(root);
-        } else if e[k] < 0.0 {
-            far = far.min(root);
-        } else if a[k] < 0.0 || !a[k].is_finite() {
+/// A ray in the plane of the offset triangle at w: the line in which it crosses that flat triangle.
+pub struct Line {
+    pub w: f64,
+    /// Depths at which it enters and leaves, in the order of t.
+    pub ends: [f64; 2],
+    /// The sides it passes there.
+    pub sides: [u8; 2],
+    /// b_k at depth z is start_k + z change_k.
+    pub start: [f64; 3],
+    pub change: [f64; 3],
+    /// Ray parameter per depth.
+    pub per_depth: f64,
+}
+
+impl Line {
+    /// `None` where the ray misses the triangle.
+    pub fn new(patch: &Patch<'_>, frame: &RayFrame, w: f64) -> Option<Self> {
+        let (origin, direction) = in_world(frame);
+        let p = corners(patch, origin, w);
+        let normal = (p[1] - p[0]).cross(p[2] - p[0]);
+        // Seen along the axis that the triangle faces most.
+        let main = normal.abs().max_position();
+        let seen = |v: DVec3| DVec2::new(v[(main + 1) % 3], v[(main + 2) % 3]);
+        let (q, d) = (p.map(seen), seen(direction));
+        let area = (q[1] - q[0]).perp_dot(q[2] - q[0]);
+        let (mut start, mut change) = ([0.0; 3], [0.0; 3]);
+        let mut near = (f64::NEG_INFINITY, 0);
+        let mut far = (f64::INFINITY, 0);
+        for k in 0..3 {
+            let (i, j) = (q[(k + 1) % 3], q[(k + 2) % 3]);
+            start[k] = i.perp_dot(j) / area;
+            change[k] = (j - i).perp_dot(d) / area;
+            let root = -start[k] / change[k];
+            if change[k] > 0.0 {
+                near = if root > near.0 { (root, k as u8) } else { near };
+            } else if change[k] < 0.0 {
+                far = if root < far.0 { (root, k as u8) } else { far };
+            } else if start[k] < 0.0 || !start[k].is_finite() {
+                return None;
+            }
+        }
+        if !(near.0 < far.0 && near.0.is_finite() && far.0.is_finite()) {
             return None;
         }
+        let [from, to] = if frame.per_depth > 0.0 {
+            [near, far]
+        } else {
+            [far, near]
+        };
+        Some(Self {
+            w,
+            ends: [from.0, to.0],
+            sides: [from.1, to.1],
+            start,
+            change,
+            per_depth: frame.per_depth,
+        })
     }
-    if !(near < far && near.is_finite() && far.is_finite()) {
-        return None;
+
+    /// As a curve, straight, with A = 1.
+    fn curve<Q: Quad>(&self, patch: &Patch<'_>) -> Curve<Q> {
+        let base = patch.texels[0].floor();
+        let place = |z: f64| {
+            let b = |k: usize| self.start[k] + z * self.change[k];
+            let texel = patch.texel(b(1), b(2)) - base;
+            [texel.x, texel.y, b(1), b(2)]
+        };
+        let [from, to] = self.ends;
+        let (start, end) = (place(from), place(to));
+        let zero = Q::splat(0.0);
+        Curve {
+            place: [
+                Q::from_array(start),
+                Q::from_array(std::array::from_fn(|k| end[k] - start[k])),
+                zero,
+            ],
+            depth: [
+                Q::from_array([1.0, from, 0.0, 0.0]),
+                Q::from_array([0.0, to - from, 0.0, 0.0]),
+                zero,
+            ],
+            w: [self.w, 0.0],
+            is_wide: true,
+            texel_base: base.to_array(),
+            per_depth: self.per_depth,
+        }
     }
-    let [from, to] = if frame.per_depth > 0.0 { [near, far] } else { [far, near] };
-    let base = patch.texels[0].floor();
-    let place = |z: f64| {
-        let (u, v) = (a[1] + z * e[1], a[2] + z * e[2]);
-        let texel = patch.texel(u, v) - base;
-        [texel.x, texel.y, u, v]
-    };
-    let (start, end) = (place(from), place(to));
-    let zero = Q::splat(0.0);
-    Some(Curve {
-        place: [
-            Q::from_array(start),
-            Q::from_array(std::array::from_fn(|k| end[k] - start[k])),
-            zero,
-        ],
-        depth: [
-            Q::from_array([1.0, from, 0.0, 0.0]),
-            Q::from_array([0.0, to - from, 0.0, 0.0]),
-            zero,
-        ],
-        w: [w, 0.0],
-        is_wide: true,
-        texel_base: base.to_array(),
-        per_depth: frame.per_depth,
-    })
+}
+
+/// The curve of a ray that lies in the plane of the offset triangle at w, in the order of t.
+pub fn flat<Q: Quad>(patch: &Patch<'_>, frame: &RayFrame, w: f64) -> Option<Curve<Q>> {
+    Line::new(patch, frame, w).map(|line| line.curve(patch))
 }
 
 /// Heights w within the range whose plane holds the ray's origin, and so all of a ray that is edge-on: roots of
