@@ -134,23 +134,6 @@ impl Cluster {
         )
     }
 
-    /// One prism in all lanes.
-    #[inline(always)]
-    pub fn splat<L: Lanes>(
-        &self,
-        lane: usize,
-        axes: [usize; 3],
-    ) -> ([[L; 3]; 3], [[L; 3]; 3], [L; 2]) {
-        let by_axes = |rows: &[[[f32; LANES]; 3]; 3]| {
-            [0, 1, 2].map(|k: usize| axes.map(|axis| L::splat(rows[k][axis][lane])))
-        };
-        (
-            by_axes(&self.vertices),
-            by_axes(&self.normals),
-            self.offsets(lane).map(L::splat),
-        )
-    }
-
     /// Whether t is monotone in w on all rays through a lane's prism.
     #[inline(always)]
     pub fn is_ordered(&self, lane: usize) -> bool {

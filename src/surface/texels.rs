@@ -219,16 +219,6 @@ impl StoredTexels {
         }
     }
 
-    /// Texel `index` as stored.
-    #[inline(always)]
-    pub fn get(&self, index: usize) -> f32 {
-        match self {
-            Self::U8(t) => u8::load(&t[index]).into(),
-            Self::U16(t) => u16::load(&t[index]).into(),
-            Self::F32(t) => f32::load(&t[index]),
-        }
-    }
-
     /// The smallest and largest of a run of texels, as stored; `None` for an empty one.
     pub fn range(&self, run: Range<usize>) -> Option<(f32, f32)> {
         fn range<T: Texel>(run: &[T::Atomic]) -> Option<(f32, f32)> {

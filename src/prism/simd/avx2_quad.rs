@@ -113,12 +113,6 @@ impl Quad for Avx2Quad {
     }
 
     #[inline(always)]
-    fn select_negative(self, a: Self, b: Self) -> Self {
-        // SAFETY: AVX is there wherever an `Avx2Quad` is.
-        Self(unsafe { _mm256_blendv_pd(b.0, a.0, self.0) })
-    }
-
-    #[inline(always)]
     fn broadcast<const K: usize>(self) -> Self {
         // SAFETY: AVX2 is there wherever an `Avx2Quad` is.
         unsafe {

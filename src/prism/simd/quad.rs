@@ -30,8 +30,6 @@ pub(crate) trait Quad:
     fn rotate(self) -> Self;
     /// Bit k: lane k's sign bit.
     fn sign_mask(self) -> u32;
-    /// `a` where the sign bit is set, `b` elsewhere.
-    fn select_negative(self, a: Self, b: Self) -> Self;
     /// All lanes become lane k.
     fn broadcast<const K: usize>(self) -> Self;
     /// The largest of the lanes 0, 1, 2.
@@ -39,12 +37,6 @@ pub(crate) trait Quad:
     fn max_of_three(self) -> f64 {
         let [a, b, c, _] = self.to_array();
         a.max(b).max(c)
-    }
-    /// The smallest of the lanes 0, 1, 2.
-    #[inline(always)]
-    fn min_of_three(self) -> f64 {
-        let [a, b, c, _] = self.to_array();
-        a.min(b).min(c)
     }
     /// The sum of the lanes 0, 1, 2, in all of them.
     #[inline(always)]
@@ -140,16 +132,6 @@ impl Quad for PortableQuad {
         })
     }
     #[inline(always)]
-    fn select_negative(self, a: Self, b: Self) -> Self {
-        Self(std::array::from_fn(|k| {
-            if self.0[k].is_sign_negative() {
-                a.0[k]
-            } else {
-                b.0[k]
-            }
-        }))
-    }
-    #[inline(always)]
     fn broadcast<const K: usize>(self) -> Self {
         Self([self.0[K]; 4])
     }
@@ -164,12 +146,12 @@ mod tests {
         let y = Q::from_array([4.0, 9.0, 16.0, 25.0]);
         assert_eq!(x.rotate().to_array(), [-2.0, 3.0, 1.0, -2.0]);
         assert_eq!(x.sign_mask(), 0b1010);
-        assert_eq!(x.select_negative(y, x).to_array(), [1.0, 9.0, 3.0, 25.0]);
         assert_eq!(y.sqrt().to_array(), [2.0, 3.0, 4.0, 5.0]);
         assert_eq!(y.copysign(x).to_array(), [4.0, -9.0, 16.0, -25.0]);
         assert_eq!(x.mul_add(y, y).to_array(), [8.0, -9.0, 64.0, 25.0]);
         assert_eq!(x.broadcast::<2>().to_array(), [3.0; 4]);
-        assert_eq!((x.max_of_three(), x.min_of_three()), (3.0, -2.0));
+        assert_eq!(x.max_of_three(), 3.0);
+        assert_eq!(x.sum_of_three().to_array()[0], 2.0);
         assert_eq!(
             Q::from_three([1.5, 2.0, -3.0]).to_array(),
             [1.5, 2.0, -3.0, 1.5]

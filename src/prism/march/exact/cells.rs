@@ -5,7 +5,7 @@
 //! texel line, in no order: it leaves at the next line. A lane in which |f| provably stays above what the chord may be
 //! off is done with; the others are reported in order, with both ends and the turning point between.
 
-use super::signs::Signs;
+use super::signs::{Side, Signs, TexelLine};
 use crate::prism::curve::Curve;
 use crate::prism::simd::{Grid, LANES, Lanes};
 
@@ -31,13 +31,18 @@ pub struct Chord {
     pub cut: bool,
 }
 
-/// The lanes' quadratics.
-struct Lane {
+/// The lanes' cells and quadratics.
+struct Cells {
+    /// Column and row, relative to the chord's first cell.
+    column: [f32; LANES],
+    row: [f32; LANES],
     /// The chord's parameter where the lane begins, and how far it goes.
     start: [f32; LANES],
     length: [f32; LANES],
     /// f over the lane's own parameter in [0, 1].
     f: [[f32; LANES]; 3],
+    /// Lanes that begin at an x line.
+    at_x: f32,
 }
 
 impl Chord {
@@ -118,51 +123,91 @@ impl Chord {
         if possible == 0 {
             return;
         }
-        let lanes = Lane {
+        let cells = Cells {
+            column: i.to_array(),
+            row: j.to_array(),
             start: start.to_array(),
             length: length.to_array(),
             f: [f0.to_array(), f1.to_array(), f2.to_array()],
+            at_x: nx,
         };
-        self.report::<L>(possible, &lanes, curve, signs);
+        self.report::<L>(possible, &cells, curve, signs);
     }
 
     #[inline(always)]
     fn report<L: Lanes>(
         &self,
         mut possible: u32,
-        lanes: &Lane,
+        cells: &Cells,
         curve: &Curve<L::Quad>,
         signs: &mut Signs<'_>,
     ) {
-        let [s0, s1] = self.s.map(f64::from);
+        let (s0, s1) = (f64::from(self.s[0]), f64::from(self.s[1]));
         let s = |tau: f32| s0 + f64::from(tau).clamp(0.0, 1.0) * (s1 - s0);
         while possible != 0 {
-            let lane = first(possible, &lanes.start);
+            let lane = first(possible, &cells.start);
             possible &= !(1 << lane);
-            let (start, length) = (lanes.start[lane], lanes.length[lane]);
-            let [f0, f1, f2] = lanes.f.map(|f| f[lane]);
+            let (start, length) = (cells.start[lane], cells.length[lane]);
+            let [f0, f1, f2] = [cells.f[0][lane], cells.f[1][lane], cells.f[2][lane]];
             let end = f0 + f1 + f2;
-            let known = |f: f32| (f.abs() > self.off).then_some(f > 0.0);
-            let (before, after) = (known(f0), known(end));
-            let certain = !self.cut && before.is_some() && after.is_some();
-            signs.point::<L>(curve, s(start), before, s(start), false);
+            let lines = [self.begin_line(cells, lane), self.end_line(cells, lane)];
+            let before = Side::of(f0, self.off, lines[0]);
+            let after = Side::of(end, self.off, lines[1]);
+            let unknown = |side| matches!(side, Side::Unknown(_));
+            let certain = !unknown(before) && !unknown(after) && before != after;
+            let (from, above) = signs.look::<L>(curve, s(start), before);
+            signs.point::<L>(curve, (from, above), from);
             if signs.is_done() {
                 return;
             }
-            let turn = -f1 / (2.0 * f2);
-            if turn > 0.0 && turn < 1.0 && !(certain && before != after) {
-                let at = f0 + turn * (f1 + turn * f2);
-                let root = start + length * first_root(f0, f1, f2);
-                signs.point::<L>(curve, s(start + turn * length), known(at), s(root), false);
+            if certain && !self.cut && signs.any_will_do() {
+                return signs.found_any();
+            }
+            let (to, above_after) = signs.look::<L>(curve, s(start + length), after);
+            if above == above_after
+                && let Some(dip) = signs.dip::<L>(curve, [from, to], lines, above)
+            {
+                signs.point::<L>(curve, (dip, !above), dip);
                 if signs.is_done() {
                     return;
                 }
             }
-            let root = start + length * last_root(f0, f1, f2);
-            signs.point::<L>(curve, s(start + length), after, s(root), certain);
+            let root = start + length * root(f0, f1, f2);
+            signs.point::<L>(curve, (to, above_after), s(root));
             if signs.is_done() {
                 return;
             }
+        }
+    }
+
+    /// The texel line at which a lane begins; lane 0 begins where the chord does.
+    #[inline(always)]
+    fn begin_line(&self, cells: &Cells, lane: usize) -> Option<TexelLine> {
+        let axis = usize::from(lane as f32 > cells.at_x);
+        (lane > 0).then(|| self.line(cells, lane, axis, 0.0))
+    }
+
+    /// The texel line at which a lane ends, if the chord goes on.
+    #[inline(always)]
+    fn end_line(&self, cells: &Cells, lane: usize) -> Option<TexelLine> {
+        let leaves = |axis: usize| {
+            let line = self.line(cells, lane, axis, 1.0).at as f32;
+            (line - self.from[axis]) / (self.to[axis] - self.from[axis])
+        };
+        let (x, y) = (leaves(0), leaves(1));
+        let axis = usize::from(!(x <= y));
+        (x.min(y) < 1.0).then(|| self.line(cells, lane, axis, 1.0))
+    }
+
+    /// The line through which a lane enters its cell (0) or leaves it (1).
+    #[inline(always)]
+    fn line(&self, cells: &Cells, lane: usize, axis: usize, end: f32) -> TexelLine {
+        let cell = if axis == 0 { cells.column[lane] } else { cells.row[lane] };
+        let forward = (self.to[axis] - self.from[axis]).is_sign_positive();
+        let offset = if forward { end } else { 1.0 - end };
+        TexelLine {
+            axis,
+            at: f64::from(self.cells[0][axis]) + f64::from(cell + offset),
         }
     }
 }
@@ -182,26 +227,11 @@ fn first(possible: u32, start: &[f32; LANES]) -> usize {
     best
 }
 
-/// The root before the turning point of f0 + f1 r + f2 r^2, about.
+/// The root of f0 + f1 r + f2 r^2 in (0, 1], about, where there is one.
 #[inline(always)]
-fn first_root(f0: f32, f1: f32, f2: f32) -> f32 {
-    let root = (f1 * f1 - 4.0 * f0 * f2).max(0.0).sqrt();
-    // The stable form for a root on the way from f0 toward 0.
-    2.0 * f0 / (root.copysign(f0) - f1)
-}
-
-/// The root in (0, 1] next to the end, about.
-#[inline(always)]
-fn last_root(f0: f32, f1: f32, f2: f32) -> f32 {
+fn root(f0: f32, f1: f32, f2: f32) -> f32 {
     let root = (f1 * f1 - 4.0 * f0 * f2).max(0.0).sqrt();
     let q = -0.5 * (f1 + root.copysign(f1));
     let (a, b) = (q / f2, f0 / q);
-    let within = |r: f32| (0.0..=1.0).contains(&r);
-    if within(a) && within(b) {
-        a.max(b)
-    } else if within(a) {
-        a
-    } else {
-        b
-    }
+    if (0.0..=1.0).contains(&a) { a } else { b }
 }

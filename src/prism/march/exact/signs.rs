@@ -58,33 +58,68 @@ impl<'a> Signs<'a> {
         self.last = 0.0;
     }
 
-    /// The point at s, of which it may be known whether it is above; `guess` is where a crossing before it would be.
+    /// Where a point is exactly, and whether it is above S.
+    #[inline(always)]
+    pub fn look<L: Lanes>(&self, curve: &Curve<L::Quad>, s: f64, side: Side) -> (f64, bool) {
+        match side {
+            Side::Above => (s, true),
+            Side::Below => (s, false),
+            Side::Unknown(line) => L::outline(Look {
+                problem: self.problem,
+                curve,
+                s,
+                line,
+            }),
+        }
+    }
+
+    /// A point between two that are on the same side of S, and within one cell, that is on the other.
+    #[inline(always)]
+    pub fn dip<L: Lanes>(
+        &self,
+        curve: &Curve<L::Quad>,
+        ends: [f64; 2],
+        lines: [Option<TexelLine>; 2],
+        above: bool,
+    ) -> Option<f64> {
+        L::outline(Dip {
+            problem: self.problem,
+            curve,
+            ends,
+            lines,
+            above,
+        })
+    }
+
+    /// Whether a crossing between two points whose sides are certain is all that is asked.
+    #[inline(always)]
+    pub fn any_will_do(&self) -> bool {
+        self.problem.any && self.problem.is_ordered()
+    }
+
+    /// Ends the search with a crossing of which no one asks where it is.
+    #[inline(always)]
+    pub fn found_any(&mut self) {
+        self.nearest = Some(Found {
+            t: 0.0,
+            u: 0.0,
+            v: 0.0,
+        });
+        self.done = true;
+    }
+
+    /// The next point. `guess` is where a crossing since the last one would be.
     #[inline(always)]
     pub fn point<L: Lanes>(
         &mut self,
         curve: &Curve<L::Quad>,
-        s: f64,
-        known: Option<bool>,
+        (s, above): (f64, bool),
         guess: f64,
-        certain: bool,
     ) {
-        let above = match known {
-            Some(above) => above,
-            None => L::outline(IsAbove {
-                problem: self.problem,
-                curve,
-                s,
-            }),
-        };
         let before = self.above.replace(above);
-        let last = std::mem::replace(&mut self.last, s);
+        // Points that were moved to a texel line may have passed one another by a rounding.
+        let last = std::mem::replace(&mut self.last, s).min(s);
         if before.is_none_or(|before| before == above) {
-            return;
-        }
-        if certain && self.problem.any {
-            // Somewhere in the ray's interval: no one asks where.
-            self.nearest = Some(Found { t: 0.0, u: 0.0, v: 0.0 });
-            self.done = true;
             return;
         }
         let found = L::outline(Crossing {
@@ -102,6 +137,37 @@ impl<'a> Signs<'a> {
         }
         self.done = self.problem.is_ordered() || self.problem.any;
     }
+}
+
+/// On which side of S a point is, as far as a fast path knows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Side {
+    Above,
+    Below,
+    /// To be looked at; where the curve is to be exactly on a texel line first.
+    Unknown(Option<TexelLine>),
+}
+
+impl Side {
+    /// By f, which may be off by `off`.
+    #[inline(always)]
+    pub fn of(f: f32, off: f32, line: Option<TexelLine>) -> Self {
+        if f > off {
+            Self::Above
+        } else if f < -off {
+            Self::Below
+        } else {
+            Self::Unknown(line)
+        }
+    }
+}
+
+/// The line x or y = `at`, relative to the curve's texel base. The surface has its crests on such lines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexelLine {
+    /// 0 for x, 1 for y.
+    pub axis: usize,
+    pub at: f64,
 }
 
 #[inline(always)]
@@ -140,18 +206,99 @@ fn slope<Q: Quad>(c: &[Q; 3], s: Q) -> Q {
     (c[2] + c[2]).mul_add(s, c[1])
 }
 
-struct IsAbove<'a, Q> {
+struct Look<'a, Q> {
     problem: &'a Problem<'a>,
     curve: &'a Curve<Q>,
     s: f64,
+    line: Option<TexelLine>,
 }
 
-impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for IsAbove<'_, Q> {
-    type Output = bool;
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Look<'_, Q> {
+    type Output = (f64, bool);
 
     #[inline(always)]
-    fn run(self) -> bool {
-        height(&self.problem.patch(), self.curve, self.s).g > 0.0
+    fn run(self) -> (f64, bool) {
+        let s = match self.line {
+            Some(line) => on_line(self.curve, self.s, line),
+            None => self.s,
+        };
+        let g = height(&self.problem.patch(), self.curve, s).g;
+        (s, g > 0.0)
+    }
+}
+
+/// Where the curve crosses a texel line, near s: two steps of Newton's method.
+#[inline(always)]
+fn on_line<Q: Quad>(curve: &Curve<Q>, near: f64, line: TexelLine) -> f64 {
+    let mut s = near;
+    for _ in 0..2 {
+        let at = Q::splat(s);
+        let inverse = Q::splat(1.0) / quadratic(&curve.depth, at).broadcast::<0>();
+        let place = quadratic(&curve.place, at) * inverse;
+        let turn = slope(&curve.depth, at).broadcast::<0>();
+        let change = (slope(&curve.place, at) - place * turn) * inverse;
+        let miss = place.to_array()[line.axis] - line.at;
+        let moved = s - miss / change.to_array()[line.axis];
+        // Where the curve runs along the line there is nothing to be gained.
+        const FAR: f64 = 1.0 / 64.0;
+        if !((moved - near).abs() <= FAR) {
+            return near;
+        }
+        s = moved;
+    }
+    s.clamp(0.0, 1.0)
+}
+
+struct Dip<'a, Q> {
+    problem: &'a Problem<'a>,
+    curve: &'a Curve<Q>,
+    ends: [f64; 2],
+    /// The lines that bound the cell there.
+    lines: [Option<TexelLine>; 2],
+    above: bool,
+}
+
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Dip<'_, Q> {
+    type Output = Option<f64>;
+
+    /// Goes to where the slope of g is 0, by the false position between ends where |g| falls and where it rises.
+    #[inline(always)]
+    fn run(self) -> Option<f64> {
+        const MOST_STEPS: usize = 8;
+        let patch = self.problem.patch();
+        let sign = if self.above { 1.0 } else { -1.0 };
+        // A hair inside: beyond the ends are other cells.
+        let aligned = |s: f64, line: Option<TexelLine>| {
+            line.map_or(s, |line| on_line(self.curve, s, line))
+        };
+        let from = aligned(self.ends[0], self.lines[0]);
+        let to = aligned(self.ends[1], self.lines[1]);
+        let hair = 1e-9 * (to - from);
+        let (mut a, mut b) = (from + hair, to - hair);
+        let mut falls = sign * height(&patch, self.curve, a).slope;
+        let mut rises = sign * height(&patch, self.curve, b).slope;
+        if !(falls < 0.0 && rises > 0.0) {
+            return None;
+        }
+        for _ in 0..MOST_STEPS {
+            let s = a + (b - a) * (falls / (falls - rises));
+            let at = height(&patch, self.curve, s);
+            if sign * at.g <= 0.0 {
+                return Some(s);
+            }
+            let slope = sign * at.slope;
+            // No lower than a parabola through here: too high to matter.
+            let lowest = sign * at.g - slope.abs() * (b - a);
+            if lowest > 0.0 || slope == 0.0 {
+                return None;
+            }
+            if slope < 0.0 {
+                (a, falls) = (s, slope);
+            } else {
+                (b, rises) = (s, slope);
+            }
+        }
+        None
     }
 }
 
@@ -188,9 +335,8 @@ fn crossing<Q: Quad>(
     guess: f64,
     above: bool,
 ) -> Found {
-    // Newton's error is about the square of its step, in texels: what is left after a step of this length is below what
-    // f32 tells apart.
-    const FINE: f64 = 1.0 / 2048.0;
+    // Newton's error is about the square of its step, in texels.
+    const FINE: f64 = 1e-7;
     const MOST_STEPS: usize = 60;
     let mut s = if guess >= from && guess <= to {
         guess

@@ -16,7 +16,7 @@ use glam::{Vec3, Vec4};
 
 use super::Problem;
 use super::cells::{Chord, MOST_CELLS, NUDGE};
-use super::signs::Signs;
+use super::signs::{Side, Signs};
 use crate::prism::curve::{Curve, View};
 use crate::prism::simd::{Grid, LANES, Lanes, Quad, Task};
 
@@ -393,8 +393,10 @@ impl<'a, L: Lanes> Walker<'a, L> {
         // f32 cannot tell the parts of such a span from one another: f64 looks at its ends.
         if span[1] - span[0] < 16.0 * f32::EPSILON {
             let (a, b) = (f64::from(span[0]), f64::from(span[1]));
-            signs.point::<L>(self.curve, a, None, a, false);
-            signs.point::<L>(self.curve, b, None, b, false);
+            for s in [a, b] {
+                let point = signs.look::<L>(self.curve, s, Side::Unknown(None));
+                signs.point::<L>(self.curve, point, s);
+            }
             return 0;
         }
         while alive != 0 {
