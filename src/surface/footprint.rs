@@ -7,6 +7,8 @@
 
 mod region;
 
+use std::ops::RangeInclusive;
+
 use glam::DVec2;
 
 use super::{DisplacementMap, Level, TexelRect, Wrap};
@@ -96,7 +98,7 @@ impl DisplacementMap {
 }
 
 /// The repeats of a side of `n` texels that coordinates `low..=high` meet.
-fn repeats(wrap: Wrap, low: f64, high: f64, n: usize) -> std::ops::RangeInclusive<i64> {
+fn repeats(wrap: Wrap, low: f64, high: f64, n: usize) -> RangeInclusive<i64> {
     match wrap {
         Wrap::Clamp => 0..=0,
         Wrap::Repeat | Wrap::Mirror => {
@@ -151,28 +153,41 @@ impl<'m> Found<'m> {
         self.range.is_some_and(|(a, b)| a <= low && high <= b)
     }
 
-    fn include_texel(&mut self, i: usize, j: usize) {
-        let h = self.map.texels().get(j * self.map.stride() + i);
-        self.include((h, h));
+    /// Includes texels `i` of row `j`.
+    fn include_run(&mut self, i: RangeInclusive<usize>, j: usize) {
+        let row = j * self.map.stride();
+        if let Some(range) = self.map.texels().range(row + i.start()..row + i.end() + 1) {
+            self.include(range);
+        }
     }
 
     /// Includes the stored texels in `region`, from coarse blocks to fine ones: on each level first what is taken whole,
     /// so that less of the rest is worth a look.
     fn take(&mut self, region: &Region) {
+        /// Texels across and up for which blocks are not worth their while.
+        const SMALL: f64 = 24.0;
+        let (width, height) = self.map.size();
+        let last = DVec2::new(width as f64 - 1.0, height as f64 - 1.0);
+        let low = region.low.ceil().max(DVec2::ZERO);
+        let high = region.high.floor().min(last);
+        if !low.cmple(high).all() {
+            return; // beside the map
+        }
+        if (high - low).max_element() < SMALL {
+            let (is, js) = ([low.x, high.x], low.y as usize..=high.y as usize);
+            return self.take_texels(region, is, js);
+        }
         let levels = self.map.pyramid().levels();
-        let Some(mut top) = self.start(region) else {
-            return;
-        };
+        let mut top = self.start(low, high);
         loop {
             let level = &levels[top];
             let mut blocks = std::mem::take(&mut self.blocks);
             blocks.retain(|&block| self.is_undecided(region, level, block));
             blocks.retain(|&(i, j)| !self.has(level.get(i, j)));
             if top == 0 {
-                for &(i, j) in &blocks {
-                    self.take_texels(region, level, (i, j));
-                }
-                blocks.clear();
+                blocks
+                    .drain(..)
+                    .for_each(|b| self.take_block(region, level, b));
                 self.blocks = blocks;
                 return;
             }
@@ -190,18 +205,8 @@ impl<'m> Found<'m> {
         }
     }
 
-    /// Lists the blocks under the region's bounds on the finest level where they are few; returns the level. `None`
-    /// for a region beside the map.
-    fn start(&mut self, region: &Region) -> Option<usize> {
-        let (width, height) = self.map.size();
-        let last = DVec2::new(width as f64 - 1.0, height as f64 - 1.0);
-        let (low, high) = (
-            region.low.ceil().max(DVec2::ZERO),
-            region.high.floor().min(last),
-        );
-        if !low.cmple(high).all() {
-            return None;
-        }
+    /// Lists the blocks that texels `low..=high` are in on the finest level where they are few; returns the level.
+    fn start(&mut self, low: DVec2, high: DVec2) -> usize {
         let levels = self.map.pyramid().levels();
         let longest = (high - low).max_element() as usize;
         let fits = |level: &Level| longest >> level.shift() <= 1;
@@ -211,7 +216,7 @@ impl<'m> Found<'m> {
         for j in block(low.y)..=block(high.y) {
             (self.blocks).extend((block(low.x)..=block(high.x)).map(|i| (i, j)));
         }
-        Some(top)
+        top
     }
 
     /// Takes the block's entry if its texels are all in the region; otherwise tells whether some can be.
@@ -235,19 +240,30 @@ impl<'m> Found<'m> {
         true
     }
 
-    /// Texel by texel, unless that is no use any more.
-    fn take_texels(&mut self, region: &Region, level: &Level, (i, j): (usize, usize)) {
+    /// A finest block texel by texel, unless that is no use any more.
+    fn take_block(&mut self, region: &Region, level: &Level, (i, j): (usize, usize)) {
         if self.has(level.get(i, j)) {
             return;
         }
         let (width, height) = self.map.size();
         let side = 1 << level.shift();
-        for j in j * side..height.min((j + 1) * side) {
-            for i in i * side..width.min((i + 1) * side) {
-                let texel = DVec2::new(i as f64, j as f64);
-                if region.meets(texel, texel) != Meets::Outside {
-                    self.include_texel(i, j);
-                }
+        let end = |block: usize, n: usize| n.min((block + 1) * side) - 1;
+        let columns = [(i * side) as f64, end(i, width) as f64];
+        self.take_texels(region, columns, j * side..=end(j, height));
+    }
+
+    /// The texels of a rectangle inside the map, given by first and last column and by rows, that are in the region.
+    fn take_texels(
+        &mut self,
+        region: &Region,
+        [first, last]: [f64; 2],
+        rows: RangeInclusive<usize>,
+    ) {
+        for j in rows {
+            let [from, to] = region.row(j as f64);
+            let (from, to) = (from.ceil().max(first), to.floor().min(last));
+            if from <= to {
+                self.include_run(from as usize..=to as usize, j);
             }
         }
     }
@@ -268,7 +284,7 @@ impl<'m> Found<'m> {
             (last_row + 1.0 - reach, f64::INFINITY, height - 1),
         ] {
             if let Some([first, last]) = extent(corners, from, to).map(columns) {
-                (first..=last).for_each(|i| self.include_texel(i, j));
+                self.include_run(first..=last, j);
             }
         }
         if low.x - reach >= 0.0 && high.x + reach <= last_column {
@@ -280,10 +296,10 @@ impl<'m> Found<'m> {
                 continue;
             };
             if (from - SLACK).floor() < 0.0 {
-                self.include_texel(0, j);
+                self.include_run(0..=0, j);
             }
             if (to + SLACK).floor() + 1.0 > last_column {
-                self.include_texel(width - 1, j);
+                self.include_run(width - 1..=width - 1, j);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Texels: as they are given, and as a map keeps them.
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
 
 use super::Wrap;
@@ -204,6 +205,23 @@ impl StoredTexels {
             Self::U8(t) => u8::load(&t[index]).into(),
             Self::U16(t) => u16::load(&t[index]).into(),
             Self::F32(t) => f32::load(&t[index]),
+        }
+    }
+
+    /// The smallest and largest of a run of texels, as stored; `None` for an empty one.
+    pub fn range(&self, run: Range<usize>) -> Option<(f32, f32)> {
+        fn range<T: Texel>(run: &[T::Atomic]) -> Option<(f32, f32)> {
+            let (mut low, mut high) = (T::load(run.first()?), T::load(run.first()?));
+            for h in run[1..].iter().map(T::load) {
+                low = if h < low { h } else { low };
+                high = if h > high { h } else { high };
+            }
+            Some((low.into(), high.into()))
+        }
+        match self {
+            Self::U8(t) => range::<u8>(&t[run]),
+            Self::U16(t) => range::<u16>(&t[run]),
+            Self::F32(t) => range::<f32>(&t[run]),
         }
     }
 

@@ -196,9 +196,9 @@ impl Lanes for Avx2 {
         // (height + 1) * (width + 1) - 1, the last stored texel; it fits i32 because sides are at most
         // `DisplacementMap::MAX_SIDE`. The 32-bit loads of narrower texels start at such a texel and end inside
         // the four texels that `StoredTexels` keeps after the last one.
-        // An edit on another thread may store to these atomics meanwhile. They are atomics, so the compiler takes no
-        // value for constant, and the gather reads each texel with one plain load, as a relaxed load does: it is
-        // the old texel or the new one.
+        // An edit on another thread may store to these atomics meanwhile. The language has no atomic gather, so this
+        // rests on the machine: the memory is atomics', so the compiler takes no value for constant, the intrinsic
+        // is opaque to it, and x86 never tears an aligned texel: it is the old one or the new one.
         unsafe {
             let stride = _mm256_set1_epi32(grid.stride as i32);
             let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);

@@ -12,8 +12,19 @@ pub struct Region {
     /// Its bounds.
     pub low: DVec2,
     pub high: DVec2,
-    /// For each side a normal, not unit, and the least and most along it.
-    sides: [(DVec2, f64, f64); 3],
+    sides: [Side; 3],
+}
+
+/// The points between two parallel lines.
+#[derive(Clone, Copy)]
+struct Side {
+    /// Not unit.
+    normal: DVec2,
+    /// 1 / normal.x.
+    per_x: f64,
+    /// Bounds of normal . p.
+    least: f64,
+    most: f64,
 }
 
 /// How a box lies.
@@ -37,7 +48,12 @@ impl Region {
             let reach = reach * normal.abs().element_sum();
             let least = along[0].min(along[1]).min(along[2]);
             let most = along[0].max(along[1]).max(along[2]);
-            (normal, least - reach, most + reach)
+            Side {
+                normal,
+                per_x: normal.x.recip(),
+                least: least - reach,
+                most: most + reach,
+            }
         };
         Self {
             low: low - reach,
@@ -53,7 +69,13 @@ impl Region {
         }
         let mut inside = low.cmpge(self.low).all() && high.cmple(self.high).all();
         let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
-        for &(normal, least, most) in &self.sides {
+        for &Side {
+            normal,
+            least,
+            most,
+            ..
+        } in &self.sides
+        {
             let (at, reach) = (normal.dot(centre), normal.abs().dot(half));
             if at + reach < least || at - reach > most {
                 return Meets::Outside;
@@ -61,6 +83,26 @@ impl Region {
             inside &= at - reach >= least && at + reach <= most;
         }
         if inside { Meets::Inside } else { Meets::Partly }
+    }
+
+    /// First and last x of the region at height y; the first is greater where there is none.
+    pub fn row(&self, y: f64) -> [f64; 2] {
+        const NONE: [f64; 2] = [1.0, 0.0];
+        if y < self.low.y || y > self.high.y {
+            return NONE;
+        }
+        let (mut first, mut last) = (self.low.x, self.high.x);
+        for side in &self.sides {
+            let at = side.normal.y * y;
+            let (least, most) = (side.least - at, side.most - at);
+            if side.normal.x != 0.0 {
+                let (a, b) = (least * side.per_x, most * side.per_x);
+                (first, last) = (first.max(a.min(b)), last.min(a.max(b)));
+            } else if least > 0.0 || most < 0.0 {
+                return NONE;
+            }
+        }
+        [first, last]
     }
 }
 

@@ -34,8 +34,9 @@ impl Axis {
 
     /// The entries of this level whose union covers entry `i` of the next: unfolded [2Bi, 2Bi + 4B] is
     /// [2Bi, 2Bi + 2B], which is entry 2i, and [2Bi + 2B, 2Bi + 4B], which is entry 2i + 2 where there is one. Only
-    /// the last `i` has none; what is beyond the edge is then the folded map, which is cut at the same places only
-    /// if n is a multiple of B, else two entries are needed, which reach less than B too far.
+    /// the last `i` has none; what is beyond the edge is then the folded map. A repeat is cut at the same places only
+    /// if n is a multiple of B, a mirrored map never (texel n - 1 comes twice); else two entries are needed, which reach
+    /// less than B too far.
     pub fn parts(self, i: usize) -> Parts {
         let (b, n) = (self.side(), self.texels);
         let start = 2 * b * (i + 1);
@@ -51,7 +52,7 @@ impl Axis {
             // From s = start - n on: the first block that meets s, and the one that meets s + B.
             Wrap::Repeat => {
                 let s = start % n;
-                let second = if s % b == 0 { s } else { (s + b) % n };
+                let second = if s.is_multiple_of(b) { s } else { (s + b) % n };
                 [s / b, second / b]
             }
             // [low, high] backwards; 2Bi < n and B < n make `high` not negative.
@@ -123,6 +124,14 @@ impl Parts {
             all: [first, second, third],
             count,
         }
+    }
+
+    pub fn first(self) -> usize {
+        self.all[0]
+    }
+
+    pub fn others(self) -> impl Iterator<Item = usize> {
+        (1..self.count).map(move |k| self.all[k])
     }
 
     pub fn iter(&self) -> impl Iterator<Item = usize> {

@@ -57,10 +57,8 @@ fn coarser<T: Pack>(finer: &[T::Packed], axes: [Axis; 2]) -> Vec<T::Packed> {
     let next = axes.map(Axis::coarser);
     in_bands(next, |first, band: &mut [T::Packed]| {
         for (j, row) in (first..).zip(band.chunks_mut(next[0].blocks())) {
-            for (i, out) in row.iter_mut().enumerate() {
-                let entry = |i: usize, j: usize| T::unpack(finer[j * width + i]);
-                *out = T::pack(reduce::coarser(axes, (i, j), entry));
-            }
+            let entry = |i: usize, j: usize| T::unpack(finer[j * width + i]);
+            reduce::coarser_row(axes, j, entry, row);
         }
     })
 }

@@ -72,7 +72,7 @@ proptest! {
                     // Wider only where it reaches across an edge that cuts a block.
                     let mirror = WRAPS[wrap] == Wrap::Mirror;
                     let cut = |block: usize, n: usize| {
-                        (block + 2) * side >= n && (n % side != 0 || mirror)
+                        (block + 2) * side >= n && (!n.is_multiple_of(side) || mirror)
                     };
                     let exact = level.shift == 2 || WRAPS[wrap] == Wrap::Clamp
                         || !cut(i, width) && !cut(j, height);
