@@ -82,11 +82,19 @@ enum {
 _Static_assert(sizeof(struct RTCHit) >= 4 * HIT_WORDS && offsetof(struct RTCHit, instID) == 4 * 7, "RTCHit");
 
 static inline void load_words(void *out, const void *lanes, unsigned words, unsigned n, unsigned i) {
+  if (n == 1) {
+    memcpy(out, lanes, 4 * (size_t)words);
+    return;
+  }
   for (unsigned w = 0; w < words; w++)
     memcpy((char *)out + 4 * w, (const char *)lanes + 4 * ((size_t)w * n + i), 4);
 }
 
 static inline void store_words(void *lanes, const void *in, unsigned words, unsigned n, unsigned i) {
+  if (n == 1) {
+    memcpy(lanes, in, 4 * (size_t)words);
+    return;
+  }
   for (unsigned w = 0; w < words; w++)
     memcpy((char *)lanes + 4 * ((size_t)w * n + i), (const char *)in + 4 * w, 4);
 }

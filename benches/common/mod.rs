@@ -2,6 +2,9 @@
 
 #![allow(dead_code)] // every program uses a part
 
+pub mod closed;
+pub mod march;
+pub mod numbers;
 pub mod rays;
 pub mod scene;
 pub mod timing;

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DVec2, DVec3};
 
-use super::simd::{LANES, Lanes};
+use super::simd::{LANES, Lanes, Quad};
 use crate::surface::{DisplacedSurface, DisplacementMap, Patch};
 
 /// Up to eight prisms; lanes that are not used repeat the first.
@@ -32,14 +32,18 @@ const _: () = assert!(size_of::<Cluster>() == 108 * LANES);
 const FOLDED: u32 = 1 << 31;
 
 /// Base triangles that can be numbered.
-pub const MOST_PRISMS: usize = 1 << 31;
+pub const MOST_PRISMS: usize = 1 << 30;
 
-/// What the set-up needs of one prism.
-pub struct Member<'m> {
-    pub patch: Patch<'m>,
-    pub offsets: [f64; 2],
-    pub prim: u32,
-    pub folded: bool,
+/// Base triangles whose texels reach further than this are [`LONG`].
+const LONG_TEXELS: f64 = 4096.0;
+
+/// In [`Cluster::prims`]: f32 does not tell the texels along a ray apart well.
+const LONG: u32 = 1 << 30;
+
+/// Corners and normals of one prism along three axes; lanes are the corners.
+pub struct Corners<Q> {
+    pub vertices: [Q; 3],
+    pub normals: [Q; 3],
 }
 
 impl Cluster {
@@ -76,8 +80,13 @@ impl Cluster {
             for (end, w) in range.into_iter().enumerate() {
                 cluster.offsets[end][l] = AtomicU32::new(w.to_bits());
             }
-            if is_folded(&surface.patch(prim), range.map(f64::from)) {
+            let patch = surface.patch(prim);
+            if is_folded(&patch, range.map(f64::from)) {
                 cluster.prims[l] |= FOLDED;
+            }
+            let [a, b, c] = patch.texels;
+            if (b - a).abs().max((c - a).abs()).max_element() > LONG_TEXELS {
+                cluster.prims[l] |= LONG;
             }
         }
         cluster
@@ -86,7 +95,7 @@ impl Cluster {
     /// Base triangle of a lane.
     #[inline(always)]
     pub fn prim(&self, lane: usize) -> u32 {
-        self.prims[lane] & !FOLDED
+        self.prims[lane] & !(FOLDED | LONG)
     }
 
     /// The range of w of a lane.
@@ -130,37 +139,66 @@ impl Cluster {
         )
     }
 
-    /// One prism in f64. Texel coordinates are not moved by periods of the map: neighbours have the same.
+    /// Whether t is monotone in w on all rays through a lane's prism.
     #[inline(always)]
-    pub fn member<'m>(
-        &self,
-        lane: usize,
-        map: &'m DisplacementMap,
-        scale: f64,
-        midlevel: f64,
-    ) -> Member<'m> {
+    pub fn is_ordered(&self, lane: usize) -> bool {
+        self.prims[lane] & FOLDED == 0
+    }
+
+    /// Whether f32 tells the texels along any ray through a lane's prism apart.
+    #[inline(always)]
+    pub fn is_short(&self, lane: usize) -> bool {
+        self.prims[lane] & LONG == 0
+    }
+
+    /// One prism's corners in the order of `axes`.
+    #[inline(always)]
+    pub fn corners<Q: Quad>(&self, lane: usize, [x, y, z]: [usize; 3]) -> Corners<Q> {
+        let ([v0, v1, v2], [n0, n1, n2]) = (&self.vertices, &self.normals);
+        Corners {
+            vertices: [
+                Q::from_three([v0[x][lane], v1[x][lane], v2[x][lane]]),
+                Q::from_three([v0[y][lane], v1[y][lane], v2[y][lane]]),
+                Q::from_three([v0[z][lane], v1[z][lane], v2[z][lane]]),
+            ],
+            normals: [
+                Q::from_three([n0[x][lane], n1[x][lane], n2[x][lane]]),
+                Q::from_three([n0[y][lane], n1[y][lane], n2[y][lane]]),
+                Q::from_three([n0[z][lane], n1[z][lane], n2[z][lane]]),
+            ],
+        }
+    }
+
+    /// Texel coordinates of one prism's corners. They are not moved by periods of the map: neighbours have the same.
+    #[inline(always)]
+    pub fn texels(&self, lane: usize, map: &DisplacementMap) -> [DVec2; 3] {
+        let [s0, s1, s2] = &self.texcoords;
+        let texel = |s: &[[f32; LANES]; 2]| {
+            map.to_texel(DVec2::new(s[0][lane].into(), s[1][lane].into()))
+        };
+        [texel(s0), texel(s1), texel(s2)]
+    }
+
+    /// One prism in f64.
+    #[inline(always)]
+    pub fn patch<'m>(&self, lane: usize, surface: &'m DisplacedSurface) -> Patch<'m> {
         let vector = |rows: &[[f32; LANES]; 3]| {
-            DVec3::new(rows[0][lane].into(), rows[1][lane].into(), rows[2][lane].into())
+            DVec3::new(
+                rows[0][lane].into(),
+                rows[1][lane].into(),
+                rows[2][lane].into(),
+            )
         };
-        let texel = |rows: &[[f32; LANES]; 2]| {
-            map.to_texel(DVec2::new(rows[0][lane].into(), rows[1][lane].into()))
-        };
-        let [low, high] = self.offsets(lane);
         let [v0, v1, v2] = &self.vertices;
         let [n0, n1, n2] = &self.normals;
-        let [s0, s1, s2] = &self.texcoords;
-        Member {
-            patch: Patch {
-                vertices: [vector(v0), vector(v1), vector(v2)],
-                normals: [vector(n0), vector(n1), vector(n2)],
-                texels: [texel(s0), texel(s1), texel(s2)],
-                map,
-                scale,
-                midlevel,
-            },
-            offsets: [f64::from(low), f64::from(high)],
-            prim: self.prim(lane),
-            folded: self.prims[lane] & FOLDED != 0,
+        let displacement = surface.displacement();
+        Patch {
+            vertices: [vector(v0), vector(v1), vector(v2)],
+            normals: [vector(n0), vector(n1), vector(n2)],
+            texels: self.texels(lane, surface.map()),
+            map: surface.map(),
+            scale: displacement.scale.into(),
+            midlevel: displacement.midlevel.into(),
         }
     }
 }

@@ -13,11 +13,11 @@
 //! neighbour, where the side runs the other way, every term changes its sign and no digit, and so do the roots not at
 //! all: two neighbours cut the ray at the same w.
 
-use glam::DVec3;
+use glam::DVec2;
 
+use super::cluster::Corners;
 use super::ray_frame::RayFrame;
 use super::simd::Quad;
-use crate::surface::Patch;
 
 /// One prism seen along one ray; lanes are vertices, or the sides opposite them.
 pub struct View<Q> {
@@ -27,6 +27,8 @@ pub struct View<Q> {
     depth: [Q; 2],
     /// Largest lateral coordinate of a corner: Q is known to about 1e-16 of its square.
     pub width: f64,
+    /// |n_1 - n_0|^2, |n_2 - n_1|^2, |n_0 - n_2|^2.
+    pub spread: Q,
     /// Lateral direction of the sides at w = 0: decides for a ray exactly in a side's plane.
     tie: [Q; 2],
 }
@@ -89,34 +91,58 @@ impl Stretches {
     }
 }
 
+/// What [`View::cut`] finds.
+pub enum Cut {
+    /// The ray is not inside.
+    None,
+    /// The ray is inside once.
+    One(Stretch),
+    /// Ask [`View::stretches`].
+    Many,
+}
+
+/// The three sides' quadratics; bits by side.
+struct Sides<Q> {
+    coefficients: [Q; 3],
+    /// The smaller root, and the larger.
+    first: Q,
+    second: Q,
+    /// Where the parabola opens downward.
+    downward: u32,
+    /// Where there is no root.
+    unreal: u32,
+    /// Whether one is constant.
+    is_odd: bool,
+}
+
 impl<Q: Quad> View<Q> {
-    /// `reach` is the largest |w|.
+    /// `reach` is the largest |w|; the corners are along the frame's axes.
     #[inline(always)]
-    pub fn new(patch: &Patch<'_>, frame: &RayFrame, reach: f64) -> Self {
-        let [x, y, z] = frame.axes;
-        let (v, n) = (&patch.vertices, &patch.normals);
+    pub fn new(corners: &Corners<Q>, frame: &RayFrame, reach: f64) -> Self {
+        let ([vx, vy, vz], [nx, ny, nz]) = (corners.vertices, corners.normals);
         let origin = frame.origin;
         let shear = (Q::splat(frame.shear[0]), Q::splat(frame.shear[1]));
-        let depth = along::<Q>(v, z) - Q::splat(origin[2]);
-        let slope = along::<Q>(n, z);
-        let ax = along::<Q>(v, x) - Q::splat(origin[0]) - depth * shear.0;
-        let ay = along::<Q>(v, y) - Q::splat(origin[1]) - depth * shear.1;
-        let ex = along::<Q>(n, x) - slope * shear.0;
-        let ey = along::<Q>(n, y) - slope * shear.1;
+        let depth = vz - Q::splat(origin[2]);
+        let ax = vx - Q::splat(origin[0]) - depth * shear.0;
+        let ay = vy - Q::splat(origin[1]) - depth * shear.1;
+        let ex = nx - nz * shear.0;
+        let ey = ny - nz * shear.1;
         let (ax1, ay1, ex1, ey1) = (ax.rotate(), ay.rotate(), ex.rotate(), ey.rotate());
         let (ax2, ay2, ex2, ey2) = (ax1.rotate(), ay1.rotate(), ex1.rotate(), ey1.rotate());
         let reach = Q::splat(reach);
         let widest_x = ex.abs().mul_add(reach, ax.abs());
         let widest_y = ey.abs().mul_add(reach, ay.abs());
+        let (dx, dy, dz) = (nx.rotate() - nx, ny.rotate() - ny, nz.rotate() - nz);
         Self {
             areas: [
                 ax1 * ay2 - ay1 * ax2,
                 (ax1 * ey2 - ay1 * ex2) + (ex1 * ay2 - ey1 * ax2),
                 ex1 * ey2 - ey1 * ex2,
             ],
-            depth: [depth, slope],
+            depth: [depth, nz],
             width: widest_x.max(widest_y).max_of_three(),
             tie: [ax2 - ax1, ay2 - ay1],
+            spread: dx.mul_add(dx, dy.mul_add(dy, dz * dz)),
         }
     }
 
@@ -127,16 +153,19 @@ impl<Q: Quad> View<Q> {
     }
 
     /// Coefficients of A.
+    #[inline(always)]
     pub fn area(&self) -> [f64; 3] {
         let [c0, c1, c2] = self.areas;
-        let (c0, c1, c2) = (c0.to_array(), c1.to_array(), c2.to_array());
-        let sum = |c: [f64; 4]| c[0] + c[1] + c[2];
-        [sum(c0), sum(c1), sum(c2)]
+        [
+            c0.sum_of_three().to_array()[0],
+            c1.sum_of_three().to_array()[0],
+            c2.sum_of_three().to_array()[0],
+        ]
     }
 
-    /// Where the ray is inside, for w in `range`.
+    /// Where the ray is inside, for w in `range`: the one stretch of almost every ray.
     #[inline(always)]
-    pub fn stretches(&self, [low, high]: [f64; 2]) -> Stretches {
+    pub fn cut(&self, [low, high]: [f64; 2]) -> Cut {
         let [c0, c1, c2] = self.areas;
         // Bernstein coefficients over the range enclose each Q_i.
         let (first, last) = (self.at(low), self.at(high));
@@ -148,106 +177,132 @@ impl<Q: Quad> View<Q> {
         let most = first.max(last).max(middle);
         let above = (Q::splat(0.0) - least).sign_mask() & 7;
         let below = most.sign_mask() & 7;
-        let mut found = Stretches::new();
-        let whole = |counter_clockwise| Stretch {
-            w: [low, high],
-            ends: [End::Cap; 2],
-            counter_clockwise,
-        };
-        if above == 7 {
-            found.push(whole(true));
-        } else if below == 7 {
-            found.push(whole(false));
-        } else {
-            if below == 0 {
-                self.cut([low, high], true, &mut found);
-            }
-            if above == 0 {
-                self.cut([low, high], false, &mut found);
-            }
+        if above == 7 || below == 7 {
+            return Cut::One(Stretch {
+                w: [low, high],
+                ends: [End::Cap; 2],
+                counter_clockwise: above == 7,
+            });
         }
-        found
+        match (below == 0, above == 0) {
+            (true, true) => Cut::Many,
+            (false, false) => Cut::None,
+            (counter_clockwise, _) => self.cut_by_sides([low, high], counter_clockwise),
+        }
     }
 
-    /// The general case for one sign of A.
+    /// The stretch for one sign of A.
     #[inline(always)]
-    fn cut(&self, [low, high]: [f64; 2], counter_clockwise: bool, found: &mut Stretches) {
-        let zero = Q::splat(0.0);
-        // Adding 0 makes -0 and 0 one.
-        let sign = Q::splat(if counter_clockwise { 1.0 } else { -1.0 });
-        let [c0, c1, c2] = self.areas;
-        let (c0, c1, c2) = (sign * c0 + zero, sign * c1 + zero, sign * c2 + zero);
-        let discriminant = c1 * c1 - Q::splat(4.0) * c0 * c2;
-        // q = -(c1 + sign(c1) sqrt(discriminant)) / 2, roots q / c2 and c0 / q; a linear Q has one root at infinity.
-        let q = Q::splat(-0.5) * (c1 + discriminant.max(zero).sqrt().copysign(c1));
-        let (r, s) = (q / c2, c0 / q);
-        let (first, second) = (r.min(s).to_array(), r.max(s).to_array());
-        let (c0, c1, c2) = (c0.to_array(), c1.to_array(), c2.to_array());
-        let discriminant = discriminant.to_array();
+    fn cut_by_sides(&self, [low, high]: [f64; 2], counter_clockwise: bool) -> Cut {
+        let (from, to) = (Q::splat(low), Q::splat(high));
+        let sides = self.roots(counter_clockwise);
+        let Sides {
+            downward,
+            unreal,
+            first,
+            second,
+            ..
+        } = sides;
+        if sides.is_odd {
+            return Cut::Many;
+        }
+        let within = |r: Q| !((r - from).sign_mask() | (to - r).sign_mask());
+        let (a, b) = (within(first), within(second));
+        // Two roots of an upward parabola within the range cut the inside in two.
+        if a & b & !downward & !unreal & 7 != 0 {
+            return Cut::Many;
+        }
+        // Downward: inside between the roots. Upward: outside between them.
+        let covered = (first - from).sign_mask() & (to - second).sign_mask();
+        let nothing = unreal & downward | !unreal & !downward & covered;
+        if nothing & 7 != 0 {
+            return Cut::None;
+        }
+        let (first, second) = (first.to_array(), second.to_array());
         let mut stretch = Stretch {
             w: [low, high],
             ends: [End::Cap; 2],
             counter_clockwise,
         };
         for k in 0..3 {
-            let side = End::Side(k as u8);
-            let [from, to] = stretch.w;
+            let bit = 1 << k;
+            if unreal & bit != 0 {
+                continue;
+            }
+            let is_downward = downward & bit != 0;
+            let begin = if is_downward { first[k] } else { second[k] };
+            let end = if is_downward { second[k] } else { first[k] };
+            let begins = is_downward || b & bit != 0;
+            let ends = is_downward || a & bit != 0;
+            if begins && begin > stretch.w[0] {
+                (stretch.w[0], stretch.ends[0]) = (begin, End::Side(k as u8));
+            }
+            if ends && end < stretch.w[1] {
+                (stretch.w[1], stretch.ends[1]) = (end, End::Side(k as u8));
+            }
+        }
+        if stretch.w[0] < stretch.w[1] {
+            Cut::One(stretch)
+        } else {
+            Cut::None
+        }
+    }
+
+    /// Roots of the three quadratics, with the sign that makes the inside positive.
+    #[inline(always)]
+    fn roots(&self, counter_clockwise: bool) -> Sides<Q> {
+        let zero = Q::splat(0.0);
+        let sign = Q::splat(if counter_clockwise { 1.0 } else { -1.0 });
+        // Adding 0 makes -0 and 0 one.
+        let [c0, c1, c2] = self.areas;
+        let (c0, c1, c2) = (sign * c0 + zero, sign * c1 + zero, sign * c2 + zero);
+        let discriminant = c1 * c1 - Q::splat(4.0) * c0 * c2;
+        // q = -(c1 + sign(c1) sqrt(discriminant)) / 2, roots q / c2 and c0 / q; a linear Q has one root at infinity.
+        let q = Q::splat(-0.5) * (c1 + discriminant.max(zero).sqrt().copysign(c1));
+        let (r, s) = (q / c2, c0 / q);
+        let constant = (c1.abs() + c2.abs() - Q::splat(f64::MIN_POSITIVE)).sign_mask();
+        Sides {
+            coefficients: [c0, c1, c2],
+            first: r.min(s),
+            second: r.max(s),
+            downward: c2.sign_mask(),
+            unreal: discriminant.sign_mask(),
+            is_odd: constant & 7 != 0,
+        }
+    }
+
+    /// All stretches of both signs: for the few rays that leave through a bent side and come back, see the triangle turn
+    /// over, or lie in the plane of a side.
+    #[cold]
+    #[inline(never)]
+    pub fn stretches(&self, range: [f64; 2]) -> Stretches {
+        let mut found = Stretches::new();
+        for counter_clockwise in [true, false] {
+            self.sort_cuts(range, counter_clockwise, &mut found);
+        }
+        found
+    }
+
+    /// Sorts all roots and keeps the stretches whose middle is inside.
+    fn sort_cuts(&self, [low, high]: [f64; 2], counter_clockwise: bool, found: &mut Stretches) {
+        let sides = self.roots(counter_clockwise);
+        let [c0, c1, c2] = sides.coefficients.map(Q::to_array);
+        let (first, second) = (sides.first.to_array(), sides.second.to_array());
+        let mut cuts = [(high, End::Cap); 8];
+        cuts[0] = (low, End::Cap);
+        let mut count = 1;
+        let mut constant = 0;
+        for k in 0..3 {
             if c1[k] == 0.0 && c2[k] == 0.0 {
                 if c0[k] < 0.0 || (c0[k] == 0.0 && self.is_left_out(k) == counter_clockwise) {
                     return;
                 }
+                constant |= 1 << k;
                 continue;
             }
-            let (r, s) = (first[k], second[k]);
-            if discriminant[k] < 0.0 {
-                if c2[k] < 0.0 {
-                    return;
-                }
-            } else if c2[k] < 0.0 {
-                // Inside between the roots.
-                if r > from {
-                    (stretch.w[0], stretch.ends[0]) = (r, side);
-                }
-                if s < to {
-                    (stretch.w[1], stretch.ends[1]) = (s, side);
-                }
-            } else if r > from && s < to {
-                return self.cut_in_two([low, high], counter_clockwise, &first, &second, found);
-            } else if r <= from && s > from {
-                (stretch.w[0], stretch.ends[0]) = (s, side);
-            } else if s >= to && r < to {
-                (stretch.w[1], stretch.ends[1]) = (r, side);
+            if c1[k] * c1[k] - 4.0 * c0[k] * c2[k] < 0.0 {
+                continue;
             }
-            if stretch.w[0] >= stretch.w[1] {
-                return;
-            }
-        }
-        found.push(stretch);
-    }
-
-    /// A ray in the plane of a side belongs to one of the two prisms there: to the one on whose inside it would be if it
-    /// were moved a hair along the first lateral axis, and a hair of that along the second.
-    #[cold]
-    fn is_left_out(&self, side: usize) -> bool {
-        let [x, y] = self.tie.map(|t| t.to_array()[side]);
-        if y != 0.0 { y > 0.0 } else { x < 0.0 }
-    }
-
-    /// As `cut`, where the ray leaves through a bent side and comes back: sorts all roots and keeps the
-    /// stretches whose middle is inside.
-    #[cold]
-    fn cut_in_two(
-        &self,
-        [low, high]: [f64; 2],
-        counter_clockwise: bool,
-        first: &[f64; 4],
-        second: &[f64; 4],
-        found: &mut Stretches,
-    ) {
-        let mut cuts = [(high, End::Cap); 8];
-        cuts[0] = (low, End::Cap);
-        let mut count = 1;
-        for k in 0..3 {
             for root in [first[k], second[k]] {
                 if root > low && root < high {
                     cuts[count] = (root, End::Side(k as u8));
@@ -259,8 +314,9 @@ impl<Q: Quad> View<Q> {
         let mut stretch: Option<Stretch> = None;
         for pair in cuts[..count + 1].windows(2) {
             let [(from, start), (to, end)] = [pair[0], pair[1]];
-            let outside = self.at(0.5 * (from + to)).sign_mask() & 7;
-            let inside = outside == if counter_clockwise { 0 } else { 7 };
+            let s = 0.5 * (from + to);
+            let inside = (0..3)
+                .all(|k| constant >> k & 1 != 0 || c0[k] + s * (c1[k] + s * c2[k]) >= 0.0);
             if !inside {
                 if let Some(done) = stretch.take() {
                     found.push(done);
@@ -277,6 +333,14 @@ impl<Q: Quad> View<Q> {
         if let Some(done) = stretch {
             found.push(done);
         }
+    }
+
+    /// A ray in the plane of a side belongs to one of the two prisms there: to the one on whose inside it would be if it
+    /// were moved a hair along the first lateral axis, and a hair of that along the second.
+    #[cold]
+    fn is_left_out(&self, side: usize) -> bool {
+        let [x, y] = self.tie.map(|t| t.to_array()[side]);
+        if y != 0.0 { y > 0.0 } else { x < 0.0 }
     }
 }
 
@@ -295,12 +359,17 @@ pub struct Curve<Q> {
     pub texel_base: [f64; 2],
     /// Ray parameter per depth.
     pub per_depth: f64,
+    /// Whether A is well above what rounding leaves of it.
+    pub is_wide: bool,
 }
+
+/// A below this part of the prism's width squared is a grazing ray's; rounding is a ten-millionth of that.
+pub const EDGE_ON: f64 = 1e-9;
 
 impl<Q: Quad> Curve<Q> {
     /// The curve over a stretch; in folded prisms, where t is not monotone in w, any direction will do.
     #[inline(always)]
-    pub fn new(view: &View<Q>, patch: &Patch<'_>, stretch: &Stretch, frame: &RayFrame) -> Self {
+    pub fn new(view: &View<Q>, texels: &[DVec2; 3], stretch: &Stretch, frame: &RayFrame) -> Self {
         // dt/dw has the sign of (N' . m) / (d . m), m the area normal of the triangle at w: d . m has the sign of A d_main,
         // and N' . m is positive in prisms that are not folded.
         let [from, to] = if stretch.counter_clockwise == (frame.per_depth > 0.0) {
@@ -312,7 +381,6 @@ impl<Q: Quad> Curve<Q> {
         let (start, change) = (Q::splat(from), Q::splat(span));
         let areas = stretched(&view.areas, start, change);
 
-        let texels = &patch.texels;
         let base = texels[0].floor();
         let local = [texels[0] - base, texels[1] - base, texels[2] - base];
         let places = [
@@ -334,8 +402,10 @@ impl<Q: Quad> Curve<Q> {
         ];
         // A is 1 in the middle: the units of area go.
         let middle = quadratic(&depth, Q::splat(0.5));
-        let unit = Q::splat(1.0) / middle.broadcast::<0>();
+        let area = middle.broadcast::<0>();
+        let unit = Q::splat(1.0) / area;
         Self {
+            is_wide: area.to_array()[0].abs() > EDGE_ON * view.width * view.width,
             place: [
                 weighted(q0, &places) * unit,
                 weighted(q1, &places) * unit,
@@ -363,11 +433,17 @@ impl<Q: Quad> Curve<Q> {
         s.mul_add(self.w[1], self.w[0])
     }
 
-    /// Ray parameter at s.
+    /// Ray parameters at both ends.
     #[inline(always)]
-    pub fn t(&self, s: f64) -> f64 {
-        let [_, z, zn, _] = self.at(s).1.to_array();
-        (z + self.w(s) * zn) * self.per_depth
+    pub fn ends(&self) -> [f64; 2] {
+        let [d0, d1, d2] = self.depth;
+        let [a0, z0, n0, _] = d0.to_array();
+        let [a1, z1, n1, _] = (d0 + d1 + d2).to_array();
+        let [w, change] = self.w;
+        [
+            (z0 + w * n0) / a0 * self.per_depth,
+            (z1 + (w + change) * n1) / a1 * self.per_depth,
+        ]
     }
 
     /// A's coefficients.
@@ -399,13 +475,6 @@ impl<Q: Quad> Curve<Q> {
             ..*self
         }
     }
-}
-
-/// One coordinate of three vectors; lane 3 repeats lane 0.
-#[inline(always)]
-fn along<Q: Quad>(vectors: &[DVec3; 3], axis: usize) -> Q {
-    let [a, b, c] = vectors;
-    Q::from_array([a[axis], b[axis], c[axis], a[axis]])
 }
 
 /// c0 + c1 s + c2 s^2.

@@ -4,7 +4,7 @@ use super::cluster::{Cluster, groups};
 use super::cull::Pairs;
 use super::march::exact::{Found, Problem, root, search};
 use super::ray_frame::RayFrame;
-use super::simd::{Grid, LANES, Lanes};
+use super::simd::{LANES, Lanes};
 use super::{Parts, PrismHit, Prisms};
 use crate::ray::Ray;
 use crate::surface::DisplacedSurface;
@@ -55,7 +55,7 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
-        if let Some(found) = prisms.search::<L>(cluster, lane, &frame, interval, false) {
+        if let Some(found) = search::<L>(&prisms.problem(cluster, lane, interval, false), &frame) {
             // Of two at the same t the lower base triangle, whatever the order of the lanes.
             let beats = nearest.is_none_or(|(best, of)| {
                 let (new, old) = (found.t as f32, best.t as f32);
@@ -68,8 +68,8 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
         }
     }
     let (found, lane) = nearest?;
-    let member = prisms.member(cluster, lane);
-    Some(root(&member.patch, &found).to_hit(member.prim))
+    let problem = prisms.problem(cluster, lane, interval, false);
+    Some(root::<L>(&problem, &found).to_hit(cluster.prim(lane)))
 }
 
 /// Whether a cluster is hit at all.
@@ -83,9 +83,8 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
-        if prisms
-            .search::<L>(cluster, lane, &frame, frame.interval, true)
-            .is_some()
+        let problem = prisms.problem(cluster, lane, frame.interval, true);
+        if search::<L>(&problem, &frame).is_some()
         {
             return true;
         }
@@ -112,34 +111,19 @@ fn meeting<L: Lanes>(cluster: &Cluster, frame: &RayFrame) -> u32 {
 
 impl Prisms {
     #[inline(always)]
-    fn member(&self, cluster: &Cluster, lane: usize) -> super::cluster::Member<'_> {
-        let displacement = self.surface.displacement();
-        cluster.member(
-            lane,
-            self.surface.map(),
-            f64::from(displacement.scale),
-            f64::from(displacement.midlevel),
-        )
-    }
-
-    #[inline(always)]
-    fn search<L: Lanes>(
-        &self,
-        cluster: &Cluster,
+    fn problem<'a>(
+        &'a self,
+        cluster: &'a Cluster,
         lane: usize,
-        frame: &RayFrame,
         interval: [f32; 2],
         any: bool,
-    ) -> Option<Found> {
-        let member = self.member(cluster, lane);
-        let problem = Problem {
-            patch: &member.patch,
-            grid: &Grid::new(self.surface.map()),
-            offsets: member.offsets,
-            ordered: !member.folded,
+    ) -> Problem<'a> {
+        Problem {
+            surface: &self.surface,
+            cluster,
+            lane,
             any,
             interval,
-        };
-        search::<L>(&problem, frame)
+        }
     }
 }

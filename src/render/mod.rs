@@ -27,6 +27,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub use integrator::RayCounts;
+pub use offset::RayOffset;
 pub use tone::to_srgb8;
 
 use crate::scene::{Camera, Film, Light, Material};

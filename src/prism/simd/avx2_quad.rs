@@ -3,6 +3,8 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
+use glam::Vec4;
+
 use super::quad::Quad;
 
 #[derive(Clone, Copy)]
@@ -45,6 +47,18 @@ impl Quad for Avx2Quad {
         // SAFETY: AVX is there; an unaligned store of 4 doubles into an array of 4.
         unsafe { _mm256_storeu_pd(out.as_mut_ptr(), self.0) };
         out
+    }
+
+    #[inline(always)]
+    fn from_three([a, b, c]: [f32; 3]) -> Self {
+        // SAFETY: called in AVX2 kernels only.
+        Self(unsafe { _mm256_cvtps_pd(_mm_setr_ps(a, b, c, a)) })
+    }
+
+    #[inline(always)]
+    fn to_f32(self) -> Vec4 {
+        // SAFETY: AVX is there wherever an `Avx2Quad` is.
+        Vec4::from(unsafe { _mm256_cvtpd_ps(self.0) })
     }
 
     #[inline(always)]

@@ -4,6 +4,8 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
+use glam::Vec4;
+
 /// Four f64 values: the least that the set-up needs. Additions and products are rounded one by one unless
 /// [`mul_add`](Self::mul_add) is asked for, so that a side's quadratic has the same digits seen from both prisms.
 pub(crate) trait Quad:
@@ -12,6 +14,10 @@ pub(crate) trait Quad:
     fn splat(x: f64) -> Self;
     fn from_array(x: [f64; 4]) -> Self;
     fn to_array(self) -> [f64; 4];
+    /// Three lanes, and the first once more.
+    fn from_three(x: [f32; 3]) -> Self;
+    /// Rounded.
+    fn to_f32(self) -> Vec4;
     /// self * a + b, fused where the machine can.
     fn mul_add(self, a: Self, b: Self) -> Self;
     fn min(self, other: Self) -> Self;
@@ -39,6 +45,12 @@ pub(crate) trait Quad:
     fn min_of_three(self) -> f64 {
         let [a, b, c, _] = self.to_array();
         a.min(b).min(c)
+    }
+    /// The sum of the lanes 0, 1, 2, in all of them.
+    #[inline(always)]
+    fn sum_of_three(self) -> Self {
+        let next = self.rotate();
+        self + next + next.rotate()
     }
 }
 
@@ -82,6 +94,15 @@ impl Quad for PortableQuad {
     #[inline(always)]
     fn to_array(self) -> [f64; 4] {
         self.0
+    }
+    #[inline(always)]
+    fn from_three([a, b, c]: [f32; 3]) -> Self {
+        Self([a.into(), b.into(), c.into(), a.into()])
+    }
+    #[inline(always)]
+    fn to_f32(self) -> Vec4 {
+        let [a, b, c, d] = self.0;
+        Vec4::new(a as f32, b as f32, c as f32, d as f32)
     }
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
@@ -149,6 +170,11 @@ mod tests {
         assert_eq!(x.mul_add(y, y).to_array(), [8.0, -9.0, 64.0, 25.0]);
         assert_eq!(x.broadcast::<2>().to_array(), [3.0; 4]);
         assert_eq!((x.max_of_three(), x.min_of_three()), (3.0, -2.0));
+        assert_eq!(
+            Q::from_three([1.5, 2.0, -3.0]).to_array(),
+            [1.5, 2.0, -3.0, 1.5]
+        );
+        assert_eq!(y.to_f32(), Vec4::new(4.0, 9.0, 16.0, 25.0));
         assert_eq!(x.abs().to_array(), [1.0, 2.0, 3.0, 0.0]);
         assert_eq!(x.min(y).max(Q::splat(-1.0)).to_array(), [1.0, -1.0, 3.0, -0.0]);
     }

@@ -10,7 +10,7 @@ use crate::prism::curve::Curve;
 use crate::prism::simd::{Grid, LANES, Lanes};
 
 /// Most cells of a chord: one lane each.
-pub const MOST_CELLS: i32 = LANES as i32;
+pub const MOST_CELLS: f32 = LANES as f32;
 
 /// A chord that is this close to a texel line, in texels, has crossed it: so that a corner between two lanes, each off by a
 /// rounding, is in both rather than in none.
@@ -21,6 +21,8 @@ pub struct Chord {
     /// (x, y, h) at both ends; x, y relative to the curve's base, h in stored texel units.
     pub from: [f32; 3],
     pub to: [f32; 3],
+    /// The cells that both ends are in.
+    pub cells: [[f32; 2]; 2],
     /// The curve's parameter there.
     pub s: [f32; 2],
     /// How far f may be off, stored texel units.
@@ -50,8 +52,8 @@ impl Chord {
     ) {
         let [x0, y0, h0] = self.from;
         let [x1, y1, h1] = self.to;
-        let (i0, j0) = (x0.floor(), y0.floor());
-        let (nx, ny) = ((x1.floor() - i0).abs(), (y1.floor() - j0).abs());
+        let [[i0, j0], [i1, j1]] = self.cells;
+        let (nx, ny) = ((i1 - i0).abs(), (j1 - j0).abs());
         let (dx, dy, dh) = (x1 - x0, y1 - y0, h1 - h0);
         // Positions relative to the first cell: few digits before the point.
         let (x0, y0) = (x0 - i0, y0 - j0);

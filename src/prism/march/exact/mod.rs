@@ -13,34 +13,42 @@ mod pieces;
 mod signs;
 mod span;
 
-use glam::DVec3;
-
 use super::polish::Root;
-use crate::prism::curve::{Curve, View};
+use crate::prism::cluster::Cluster;
+use crate::prism::curve::{Curve, Cut, Stretch, View};
 use crate::prism::ray_frame::RayFrame;
-use crate::prism::simd::{Grid, Lanes, Quad, Task};
-use crate::surface::Patch;
+use crate::prism::simd::{Lanes, Quad, Task};
+use crate::surface::{DisplacedSurface, Patch};
 use pieces::Piece;
 use signs::Signs;
 use span::Walker;
 
-/// The prism, the map, and what is asked of them.
+/// One prism of a cluster, and what is asked of it.
+#[derive(Clone, Copy)]
 pub struct Problem<'a> {
-    /// The prism in f64.
-    pub patch: &'a Patch<'a>,
-    /// The map as the kernels see it.
-    pub grid: &'a Grid<'a>,
-    /// Smallest and largest w of the surface.
-    pub offsets: [f64; 2],
-    /// Whether t is monotone in w: not so in folded prisms, where all crossings are looked for and the nearest kept.
-    pub ordered: bool,
+    pub surface: &'a DisplacedSurface,
+    pub cluster: &'a Cluster,
+    pub lane: usize,
     /// Whether any crossing will do.
     pub any: bool,
     /// The open interval of ray parameters.
     pub interval: [f32; 2],
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    /// The prism in f64.
+    #[inline(always)]
+    fn patch(&self) -> Patch<'a> {
+        self.cluster.patch(self.lane, self.surface)
+    }
+
+    /// Whether t is monotone in w: not so in folded prisms, where all crossings are looked for and the nearest kept.
+    #[inline(always)]
+    fn is_ordered(&self) -> bool {
+        self.cluster.is_ordered(self.lane)
+    }
+
+    #[inline(always)]
     fn accepts(&self, t: f64) -> bool {
         let t = t as f32;
         t > self.interval[0] && t < self.interval[1]
@@ -61,23 +69,56 @@ pub struct Found {
 /// The first crossing inside a prism, or any.
 #[inline(always)]
 pub fn search<L: Lanes>(problem: &Problem<'_>, frame: &RayFrame) -> Option<Found> {
-    let reach = problem.offsets[0].abs().max(problem.offsets[1].abs());
-    let view = View::<L::Quad>::new(problem.patch, frame, reach);
-    if pieces::is_edge_on(&view, problem.offsets) {
-        return L::outline(EdgeOn { problem, frame });
+    let [low, high] = problem.cluster.offsets(problem.lane);
+    let range = [f64::from(low), f64::from(high)];
+    let reach = low.abs().max(high.abs());
+    let corners = problem.cluster.corners::<L::Quad>(problem.lane, frame.axes);
+    let view = View::new(&corners, frame, reach.into());
+    match view.cut(range) {
+        Cut::One(stretch) => along::<L>(problem, frame, &stretch, &view),
+        Cut::None if !pieces::is_edge_on(&view, range) => None,
+        _ => L::outline(Rare {
+            problem,
+            frame,
+            view: &view,
+            range,
+        }),
     }
-    let stretches = view.stretches(problem.offsets);
-    let mut nearest: Option<Found> = None;
-    // A loop, not an iterator: lanes must not pass through functions that lack the kernel's instruction set.
-    for stretch in stretches.as_slice() {
-        let curve = Curve::new(&view, problem.patch, stretch, frame);
-        let found = along::<L>(problem, frame, &curve, &view);
-        nearest = nearer(nearest, found);
-        if problem.any && nearest.is_some() {
-            break;
+}
+
+/// The few rays that are inside a prism more than once, or lie in the planes of its triangles.
+struct Rare<'a, Q> {
+    problem: &'a Problem<'a>,
+    frame: &'a RayFrame,
+    view: &'a View<Q>,
+    range: [f64; 2],
+}
+
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Rare<'_, Q> {
+    type Output = Option<Found>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Found> {
+        let Self { problem, frame, .. } = self;
+        let mut nearest = None;
+        if pieces::is_edge_on(self.view, self.range) {
+            let patch = problem.patch();
+            let (heights, count) = pieces::planes_that_hold(&patch, frame, self.range);
+            for &w in &heights[..count] {
+                if let Some(part) = pieces::flat::<L::Quad>(&patch, frame, w) {
+                    let mut signs = Signs::new(problem);
+                    Walker::<L>::new(problem, &part, self.view, part.ends()).walk(&mut signs);
+                    nearest = nearer(nearest, signs.nearest());
+                }
+            }
+            return nearest;
         }
+        // A loop, not an iterator: lanes must not pass through functions that lack the kernel's instruction set.
+        for stretch in self.view.stretches(self.range).as_slice() {
+            nearest = nearer(nearest, along::<L>(problem, frame, stretch, self.view));
+        }
+        nearest
     }
-    nearest
 }
 
 #[inline(always)]
@@ -93,24 +134,28 @@ fn nearer(a: Option<Found>, b: Option<Found>) -> Option<Found> {
 fn along<L: Lanes>(
     problem: &Problem<'_>,
     frame: &RayFrame,
-    curve: &Curve<L::Quad>,
+    stretch: &Stretch,
     view: &View<L::Quad>,
 ) -> Option<Found> {
-    let ends = [curve.t(0.0), curve.t(1.0)];
-    if problem.ordered
+    let texels = problem
+        .cluster
+        .texels(problem.lane, problem.surface.map());
+    let curve = Curve::new(view, &texels, stretch, frame);
+    let ends = curve.ends();
+    if problem.is_ordered()
         && (ends[1] as f32 <= problem.interval[0] || ends[0] as f32 >= problem.interval[1])
     {
         return None;
     }
-    if pieces::is_even(curve, problem.patch) {
+    if problem.cluster.is_short(problem.lane) && pieces::is_even(&curve) {
         let mut signs = Signs::new(problem);
-        Walker::<L>::new(problem, curve, ends).walk(&mut signs);
+        Walker::<L>::new(problem, &curve, view, ends).walk(&mut signs);
         return signs.nearest();
     }
     L::outline(Uneven {
         problem,
         frame,
-        curve,
+        curve: &curve,
         view,
     })
 }
@@ -134,11 +179,10 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
         while let Some(piece) = pieces.next() {
             let part = match piece {
                 Piece::Even(part) => Some(part),
-                Piece::Flat(w) => pieces::flat(problem.patch, frame, w),
+                Piece::Flat(w) => pieces::flat(&problem.patch(), frame, w),
             };
             if let Some(part) = part {
-                let ends = [part.t(0.0), part.t(1.0)];
-                Walker::<L>::new(problem, &part, ends).walk(&mut signs);
+                Walker::<L>::new(problem, &part, self.view, part.ends()).walk(&mut signs);
             }
             if signs.is_done() {
                 break;
@@ -148,41 +192,29 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
     }
 }
 
-/// The ray lies in the planes of the prism's triangles: it meets them at the one or few w whose plane holds it.
-struct EdgeOn<'a> {
-    problem: &'a Problem<'a>,
-    frame: &'a RayFrame,
-}
-
-impl<L: Lanes> Task<L> for EdgeOn<'_> {
-    type Output = Option<Found>;
-
-    #[inline(always)]
-    fn run(self) -> Option<Found> {
-        let Self { problem, frame } = self;
-        let (heights, count) = pieces::planes_that_hold(problem.patch, frame, problem.offsets);
-        let mut nearest = None;
-        for &w in &heights[..count] {
-            if let Some(part) = pieces::flat::<L::Quad>(problem.patch, frame, w) {
-                let ends = [part.t(0.0), part.t(1.0)];
-                let mut signs = Signs::new(problem);
-                Walker::<L>::new(problem, &part, ends).walk(&mut signs);
-                nearest = nearer(nearest, signs.nearest());
-            }
-        }
-        nearest
-    }
-}
-
 /// The hit on S at a crossing.
 #[inline(always)]
-pub fn root(patch: &Patch<'_>, found: &Found) -> Root {
-    let point = patch.point(found.u, found.v);
-    let ng: DVec3 = point.du.cross(point.dv);
-    Root {
-        t: found.t,
-        u: found.u,
-        v: found.v,
-        ng,
+pub fn root<L: Lanes>(problem: &Problem<'_>, found: &Found) -> Root {
+    L::outline(OnSurface { problem, found })
+}
+
+struct OnSurface<'a> {
+    problem: &'a Problem<'a>,
+    found: &'a Found,
+}
+
+impl<L: Lanes> Task<L> for OnSurface<'_> {
+    type Output = Root;
+
+    #[inline(always)]
+    fn run(self) -> Root {
+        let Found { t, u, v } = *self.found;
+        let point = self.problem.patch().point(u, v);
+        Root {
+            t,
+            u,
+            v,
+            ng: point.du.cross(point.dv),
+        }
     }
 }

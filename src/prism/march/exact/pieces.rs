@@ -9,7 +9,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::prism::curve::{Curve, View};
+use crate::prism::curve::{Curve, EDGE_ON, View};
 use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::Quad;
 use crate::surface::Patch;
@@ -23,10 +23,8 @@ const LONGEST: f64 = 8192.0;
 /// Halvings at most: below 2^-40 of a stretch w is constant.
 const DEPTH: usize = 40;
 
-/// A below this part of the prism's width squared is a grazing ray's; rounding is a ten-millionth of that.
-const EDGE_ON: f64 = 1e-9;
-
 /// Bounds of the quadratic c0 + c1 s + c2 s^2 on [0, 1].
+#[inline(always)]
 fn bounds([c0, c1, c2]: [f64; 3]) -> [f64; 2] {
     let end = c0 + c1 + c2;
     [
@@ -35,12 +33,11 @@ fn bounds([c0, c1, c2]: [f64; 3]) -> [f64; 2] {
     ]
 }
 
-/// Whether a whole curve is one piece.
+/// Whether A is nearly constant along a whole curve, and more than what rounding leaves of it.
 #[inline(always)]
-pub fn is_even<Q: Quad>(curve: &Curve<Q>, patch: &Patch<'_>) -> bool {
+pub fn is_even<Q: Quad>(curve: &Curve<Q>) -> bool {
     let [least, most] = bounds(curve.area());
-    let [a, b, c] = patch.texels;
-    least > EVEN * most && (b - a).abs().max((c - a).abs()).max_element() < LONGEST
+    least > EVEN * most && curve.is_wide
 }
 
 /// Whether A vanishes over the whole range of w.
@@ -191,6 +188,7 @@ pub fn flat<Q: Quad>(patch: &Patch<'_>, frame: &RayFrame, w: f64) -> Option<Curv
             zero,
         ],
         w: [w, 0.0],
+        is_wide: true,
         texel_base: base.to_array(),
         per_depth: frame.per_depth,
     })

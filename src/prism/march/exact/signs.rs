@@ -74,7 +74,7 @@ impl<'a> Signs<'a> {
         let above = match known {
             Some(above) => above,
             None => L::outline(IsAbove {
-                patch: self.problem.patch,
+                problem: self.problem,
                 curve,
                 s,
             }),
@@ -91,7 +91,7 @@ impl<'a> Signs<'a> {
             return;
         }
         let found = L::outline(Crossing {
-            patch: self.problem.patch,
+            problem: self.problem,
             curve,
             bracket: [last, s],
             guess,
@@ -103,7 +103,7 @@ impl<'a> Signs<'a> {
         if self.nearest.is_none_or(|n| found.t < n.t) {
             self.nearest = Some(found);
         }
-        self.done = self.problem.ordered || self.problem.any;
+        self.done = self.problem.is_ordered() || self.problem.any;
     }
 }
 
@@ -148,7 +148,7 @@ fn slope<Q: Quad>(c: &[Q; 3], s: Q) -> Q {
 }
 
 struct IsAbove<'a, Q> {
-    patch: &'a Patch<'a>,
+    problem: &'a Problem<'a>,
     curve: &'a Curve<Q>,
     s: f64,
 }
@@ -158,12 +158,12 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for IsAbove<'_, Q> {
 
     #[inline(always)]
     fn run(self) -> bool {
-        height(self.patch, self.curve, self.s).g > 0.0
+        height(&self.problem.patch(), self.curve, self.s).g > 0.0
     }
 }
 
 struct Crossing<'a, Q> {
-    patch: &'a Patch<'a>,
+    problem: &'a Problem<'a>,
     curve: &'a Curve<Q>,
     bracket: [f64; 2],
     guess: f64,
@@ -175,7 +175,13 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Crossing<'_, Q> {
 
     #[inline(always)]
     fn run(self) -> Found {
-        crossing(self.patch, self.curve, self.bracket, self.guess, self.above)
+        crossing(
+            &self.problem.patch(),
+            self.curve,
+            self.bracket,
+            self.guess,
+            self.above,
+        )
     }
 }
 

@@ -15,10 +15,10 @@
 use glam::{Vec3, Vec4};
 
 use super::Problem;
-use super::cells::{Chord, MOST_CELLS};
+use super::cells::{Chord, MOST_CELLS, NUDGE};
 use super::signs::Signs;
-use crate::prism::curve::Curve;
-use crate::prism::simd::{LANES, Lanes, Quad, Task};
+use crate::prism::curve::{Curve, View};
+use crate::prism::simd::{Grid, LANES, Lanes, Quad, Task};
 
 /// A chord this close to the curve, in texels, may be walked cell by cell.
 const CLOSE: f32 = 1.0 / 64.0;
@@ -26,7 +26,7 @@ const CLOSE: f32 = 1.0 / 64.0;
 /// Texels beyond which a span has 15 children.
 const WIDE: f32 = 10.0;
 
-/// Spans waiting; more are never needed: see [`Walker::walk`].
+/// Spans that can wait: see [`Walker::descend`].
 const STACK: usize = 160;
 
 /// An f32 value is within this many units in the last place of the magnitudes it was computed from.
@@ -51,10 +51,9 @@ pub struct Walker<'a, L: Lanes> {
     /// tnear and tfar minus t(0), widened; and whether they cut anything off.
     interval: [f32; 2],
     cut: bool,
+    grid: Grid<'a>,
     /// Texel coordinates of the curve's origin, within one period of the map.
     base: [f32; 2],
-    /// Rounding of texel coordinates that comes with the base.
-    base_rounding: f32,
 }
 
 /// What bounds a span of length 1 in its own parameter.
@@ -87,6 +86,75 @@ impl<L: Lanes> Task<L> for Walk<'_, '_, '_, L> {
     }
 }
 
+/// The rest of a walk, which few rays need, in another.
+struct Deep<'w, 'a, 's, L: Lanes> {
+    walker: &'w Walker<'a, L>,
+    signs: &'w mut Signs<'s>,
+    children: u32,
+    count: usize,
+}
+
+impl<L: Lanes> Task<L> for Deep<'_, '_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.walker.descend(self.children, self.count, self.signs);
+    }
+}
+
+/// Spans waiting, the next one last.
+struct Stack {
+    spans: [[f32; 2]; STACK],
+    count: usize,
+}
+
+impl Stack {
+    #[inline(always)]
+    fn pop(&mut self) -> Option<[f32; 2]> {
+        self.count = self.count.checked_sub(1)?;
+        Some(self.spans[self.count])
+    }
+
+    /// Takes in the named children of a span that was cut into `count`.
+    #[inline(always)]
+    fn postpone(&mut self, mut children: u32, count: usize, span: [f32; 2]) {
+        if self.count + 2 * LANES > STACK && children != 0 {
+            // Never lost: two long spans instead of many short ones.
+            let first = children.trailing_zeros() as usize;
+            let last = 32 - children.leading_zeros() as usize;
+            let (a, b) = (at(span, first, count), at(span, last, count));
+            let middle = 0.5 * (a + b);
+            self.push([middle, b]);
+            self.push([a, middle]);
+            return;
+        }
+        while children != 0 {
+            let last = 31 - children.leading_zeros() as usize;
+            children &= !(1 << last);
+            self.push([at(span, last, count), at(span, last + 1, count)]);
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, span: [f32; 2]) {
+        if self.count < STACK {
+            self.spans[self.count] = span;
+            self.count += 1;
+        }
+    }
+}
+
+/// Where child k of a span that was cut into `count` begins.
+#[inline(always)]
+fn at([from, to]: [f32; 2], k: usize, count: usize) -> f32 {
+    if k == count {
+        to
+    } else {
+        from + (to - from) * (k as f32 / count as f32)
+    }
+}
+
 /// A span in its own parameter.
 struct Span {
     place: [Vec4; 3],
@@ -97,73 +165,74 @@ struct Span {
 impl<'a, L: Lanes> Walker<'a, L> {
     /// `ends` are the ray parameters at both ends of the curve.
     #[inline(always)]
-    pub fn new(problem: &'a Problem<'a>, curve: &'a Curve<L::Quad>, ends: [f64; 2]) -> Self {
-        let patch = problem.patch;
-        let narrow = |c: &[f64; 4]| Vec4::new(c[0] as f32, c[1] as f32, c[2] as f32, c[3] as f32);
-        let [d0, d1, d2] = curve.depth;
-        let depth = [d0.to_array(), d1.to_array(), d2.to_array()];
-        let [p0, p1, p2] = curve.place;
-        let unit = f64::from(problem.grid.unit());
-        let per_world = unit / patch.scale;
-        let n = &patch.normals;
-        let [t0, t1] = ends;
+    pub fn new(
+        problem: &'a Problem<'a>,
+        curve: &'a Curve<L::Quad>,
+        view: &View<L::Quad>,
+        [t0, t1]: [f64; 2],
+    ) -> Self {
+        let displacement = problem.surface.displacement();
+        let grid = Grid::new(problem.surface.map());
+        let ([p0, p1, p2], [d0, d1, d2]) = (curve.place, curve.depth);
+        let unit = grid.unit();
+        let per_world = f64::from(unit) / f64::from(displacement.scale);
         let [w0, dw] = curve.w;
         let [tnear, tfar] = problem.interval;
-        let (tnear, tfar) = (f64::from(tnear), f64::from(tfar));
-        let cut = problem.ordered && (t0 <= tnear || t1 >= tfar);
-        let time = if cut {
-            let z = |k: usize| depth[k][1];
-            let zn = |k: usize| depth[k][2];
-            [
-                z(0) + w0 * zn(0),
-                z(1) + w0 * zn(1) + dw * zn(0),
-                z(2) + w0 * zn(2) + dw * zn(1),
-                dw * zn(2),
-            ]
-        } else {
-            [0.0; 4]
-        };
-        let time = [
-            (time[0] * curve.per_depth - t0 * depth[0][0]) as f32,
-            (time[1] * curve.per_depth - t0 * depth[1][0]) as f32,
-            (time[2] * curve.per_depth - t0 * depth[2][0]) as f32,
-            (time[3] * curve.per_depth) as f32,
-        ];
-        let magnitude = time[0].abs() + time[1].abs() + time[2].abs() + time[3].abs();
-        let slack = (magnitude + (t1 - t0).abs() as f32) * (8.0 * ROUNDING);
-        let base = problem.grid.base(curve.texel_base);
-        Self {
+        let cut =
+            problem.is_ordered() && (t0 <= f64::from(tnear) || t1 >= f64::from(tfar));
+        let (area0, area1, area2) = (d0.to_f32(), d1.to_f32(), d2.to_f32());
+        let spread = view.spread.to_f32();
+        let mut walker = Self {
             problem,
             curve,
-            place: [
-                narrow(&p0.to_array()),
-                narrow(&p1.to_array()),
-                narrow(&p2.to_array()),
-            ],
-            area: [
-                depth[0][0] as f32,
-                depth[1][0] as f32,
-                depth[2][0] as f32,
-            ],
+            base: grid.base(curve.texel_base),
+            grid,
+            place: [p0.to_f32(), p1.to_f32(), p2.to_f32()],
+            area: [area0.x, area1.x, area2.x],
             height: [(w0 * per_world) as f32, (dw * per_world) as f32],
-            midlevel: (unit * patch.midlevel) as f32,
-            spread: Vec3::new(
-                n[0].distance_squared(n[1]) as f32,
-                n[0].distance_squared(n[2]) as f32,
-                n[1].distance_squared(n[2]) as f32,
-            ),
-            time,
-            interval: [(tnear - t0) as f32 - slack, (tfar - t0) as f32 + slack],
+            midlevel: unit * displacement.midlevel,
+            spread: Vec3::new(spread.x, spread.z, spread.y),
             cut,
-            base,
-            base_rounding: ROUNDING * base[0].max(base[1]),
+            time: [0.0; 4],
+            interval: [0.0; 2],
+        };
+        if cut {
+            walker.set_times([t0, t1]);
         }
+        walker
+    }
+
+    /// Makes ready to tell what is outside the ray's interval.
+    #[inline(always)]
+    fn set_times(&mut self, [t0, t1]: [f64; 2]) {
+        let [d0, d1, d2] = self.curve.depth;
+        let ([a0, z0, n0, _], [a1, z1, n1, _]) = (d0.to_array(), d1.to_array());
+        let ([a2, z2, n2, _], [w, dw]) = (d2.to_array(), self.curve.w);
+        // (Z + w Zn) - depth(0) A, w = w(0) + dw s.
+        let per_depth = self.curve.per_depth;
+        let time = [
+            (z0 + w * n0) * per_depth - t0 * a0,
+            (z1 + w * n1 + dw * n0) * per_depth - t0 * a1,
+            (z2 + w * n2 + dw * n1) * per_depth - t0 * a2,
+            dw * n2 * per_depth,
+        ];
+        self.time = [
+            time[0] as f32,
+            time[1] as f32,
+            time[2] as f32,
+            time[3] as f32,
+        ];
+        let [c0, c1, c2, c3] = self.time;
+        let magnitude = c0.abs() + c1.abs() + c2.abs() + c3.abs() + (t1 - t0).abs() as f32;
+        let slack = magnitude * (8.0 * ROUNDING);
+        let [tnear, tfar] = self.problem.interval;
+        self.interval = [
+            (f64::from(tnear) - t0) as f32 - slack,
+            (f64::from(tfar) - t0) as f32 + slack,
+        ];
     }
 
     /// Reports to `signs` every point of the curve at which the surface may be crossed, in order.
-    ///
-    /// A waiting span is at most a 15th of the one it came from, so a stack of [`STACK`] holds ten levels of 15; deeper ones,
-    /// and f32 cannot tell many more apart, are halved instead.
     #[inline(always)]
     pub fn walk(&self, signs: &mut Signs<'_>) {
         L::outline(Walk {
@@ -175,26 +244,56 @@ impl<'a, L: Lanes> Walker<'a, L> {
     #[inline(always)]
     fn walk_here(&self, signs: &mut Signs<'_>) {
         signs.begin();
-        let mut stack = [[0.0f32; 2]; STACK];
-        stack[0] = [0.0, 1.0];
-        let mut count = 1;
-        while count > 0 {
-            count -= 1;
-            let [from, to] = stack[count];
-            let span = self.span(from, to);
-            let bounds = span.bounds(self);
-            let (alive, ends) = if bounds.reach > WIDE {
-                self.children::<2>(&span, &bounds, [from, to])
-            } else {
-                self.children::<1>(&span, &bounds, [from, to])
-            };
+        let whole = [0.0, 1.0];
+        let (alive, ends, bounds) = self.children(whole);
+        if alive == 0 {
+            return;
+        }
+        let rest = self.visit(&ends, alive, &bounds, whole, signs);
+        if rest != 0 && !signs.is_done() {
+            L::outline(Deep {
+                walker: self,
+                signs,
+                children: rest,
+                count: ends.children,
+            });
+        }
+    }
+
+    /// Cuts a span into 7 children, or 15 if it is long: which of them may meet the surface, and where they end.
+    #[inline(always)]
+    fn children(&self, [from, to]: [f32; 2]) -> (u32, Ends, Bounds) {
+        let span = self.span(from, to);
+        let bounds = span.bounds(self);
+        let (alive, ends) = if bounds.reach > WIDE {
+            self.cut_into::<2>(&span, &bounds, [from, to])
+        } else {
+            self.cut_into::<1>(&span, &bounds, [from, to])
+        };
+        (alive, ends, bounds)
+    }
+
+    /// Goes down below the children of the whole curve that could not be walked at once.
+    ///
+    /// A waiting span is at most a seventh of the one it came from, and all that wait come from different levels or the same
+    /// span, so a stack of [`STACK`] holds ten levels; deeper ones, and f32 cannot tell many more apart, are halved instead.
+    #[inline(always)]
+    fn descend(&self, children: u32, count: usize, signs: &mut Signs<'_>) {
+        let mut stack = Stack {
+            spans: [[0.0; 2]; STACK],
+            count: 0,
+        };
+        stack.postpone(children, count, [0.0, 1.0]);
+        while let Some(span) = stack.pop() {
+            let (alive, ends, bounds) = self.children(span);
             if alive == 0 {
                 continue;
             }
-            self.visit(&ends, alive, &bounds, [from, to], &mut stack, &mut count, signs);
+            let rest = self.visit(&ends, alive, &bounds, span, signs);
             if signs.is_done() {
                 return;
             }
+            stack.postpone(rest, ends.children, span);
         }
     }
 
@@ -219,9 +318,8 @@ impl<'a, L: Lanes> Walker<'a, L> {
         }
     }
 
-    /// Cuts a span into 8 `R` - 1 children: which of them may meet the surface, and where they end.
     #[inline(always)]
-    fn children<const R: usize>(
+    fn cut_into<const R: usize>(
         &self,
         span: &Span,
         bounds: &Bounds,
@@ -231,7 +329,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
         let ds = 1.0 / children as f32;
         let off = bounds.bend * ds * ds + bounds.rounding;
         let height_off = bounds.height_bend * ds * ds + bounds.height_rounding;
-        let level = self.problem.grid.level(bounds.reach * ds + 2.0 * off);
+        let level = self.grid.level(bounds.reach * ds + 2.0 * off);
 
         let zero = L::splat(0.0);
         let (mut x, mut y, mut h, mut t) = ([zero; R], [zero; R], [zero; R], [zero; R]);
@@ -249,7 +347,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
         for r in 0..R {
             let (x1, y1, h1) = (next(&x, r), next(&y, r), next(&h, r));
             let (off, height_off) = (L::splat(off), L::splat(height_off));
-            let [low, high] = self.problem.grid.block_range(
+            let [low, high] = self.grid.block_range(
                 level,
                 [L::splat(self.base[0]) + x[r].min(x1) - off, L::splat(self.base[0]) + x[r].max(x1) + off],
                 [L::splat(self.base[1]) + y[r].min(y1) - off, L::splat(self.base[1]) + y[r].max(y1) + off],
@@ -273,105 +371,70 @@ impl<'a, L: Lanes> Walker<'a, L> {
         (alive, Ends::new(children, &x, &y, &h, &range))
     }
 
-    /// Goes through the children that are left: walks their cells, in order, and puts what is too long or too bent on the
-    /// stack.
+    /// Goes through the children that are left and walks their cells, in order, up to the first that is too long or too bent;
+    /// that one and those behind are returned.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     fn visit(
         &self,
         ends: &Ends,
         mut alive: u32,
         bounds: &Bounds,
-        [from, to]: [f32; 2],
-        stack: &mut [[f32; 2]; STACK],
-        count: &mut usize,
+        span: [f32; 2],
         signs: &mut Signs<'_>,
-    ) {
-        let children = ends.children;
-        let ds = 1.0 / children as f32;
+    ) -> u32 {
+        let ds = 1.0 / ends.children as f32;
         let off = bounds.bend * ds * ds;
-        // As many children as one chord stays close over.
-        let longest = if off * (LANES * LANES) as f32 <= CLOSE {
-            LANES
-        } else {
-            (CLOSE / off).sqrt() as usize
-        };
-        let at = |k: usize| {
-            if k == children { to } else { from + (to - from) * (k as f32 * ds) }
-        };
+        // f32 cannot tell the parts of such a span from one another: f64 looks at its ends.
+        if span[1] - span[0] < 16.0 * f32::EPSILON {
+            let (a, b) = (f64::from(span[0]), f64::from(span[1]));
+            signs.point::<L>(self.curve, a, None, a, false);
+            signs.point::<L>(self.curve, b, None, b, false);
+            return 0;
+        }
         while alive != 0 {
             let first = alive.trailing_zeros() as usize;
             let mut last = first + 1;
-            if self.is_shortest(from, to) {
-                // f32 cannot tell its parts from one another: f64 looks at its ends.
-                let (a, b) = (f64::from(from), f64::from(to));
-                signs.point::<L>(self.curve, a, None, a, false);
-                signs.point::<L>(self.curve, b, None, b, false);
-                return;
+            if off > CLOSE || ends.cells(first, last) > MOST_CELLS {
+                return alive;
             }
-            if longest == 0 || ends.cells(first, last) > MOST_CELLS {
-                return self.postpone(alive, &at, stack, count);
-            }
-            while alive >> last & 1 != 0
-                && last - first < longest
-                && ends.cells(first, last + 1) <= MOST_CELLS
-            {
+            // As many children as one chord stays close over, and crosses few cells.
+            let mut length = ds;
+            while alive >> last & 1 != 0 {
+                let longer = length + ds;
+                if bounds.bend * longer * longer > CLOSE
+                    || ends.cells(first, last + 1) > MOST_CELLS
+                {
+                    break;
+                }
+                length = longer;
                 last += 1;
             }
-            let length = (last - first) as f32 * ds;
             let off = bounds.bend * length * length + bounds.rounding;
-            let slope = ends.range[first..last].iter().fold(0.0f32, |a, &b| a.max(b));
+            let mut slope = 0.0f32;
+            for k in first..last {
+                slope = slope.max(ends.range[k]);
+            }
             let chord = Chord {
                 from: ends.point(first),
                 to: ends.point(last),
-                s: [at(first), at(last)],
+                cells: [ends.cell(first), ends.cell(last)],
+                s: [
+                    at(span, first, ends.children),
+                    at(span, last, ends.children),
+                ],
                 // (x, y) off by `off` and a cell taken for its neighbour within `NUDGE` change the surface by at most this.
                 off: bounds.height_bend * length * length
                     + bounds.height_rounding
-                    + 2.0 * (off + super::cells::NUDGE) * slope,
+                    + 2.0 * (off + NUDGE) * slope,
                 cut: self.cut,
             };
-            chord.walk::<L>(self.problem.grid, self.base, self.curve, signs);
+            chord.walk::<L>(&self.grid, self.base, self.curve, signs);
             if signs.is_done() {
-                return;
+                return 0;
             }
             alive &= !0 << last;
         }
-    }
-
-    #[inline(always)]
-    fn is_shortest(&self, from: f32, to: f32) -> bool {
-        to - from < 16.0 * f32::EPSILON
-    }
-
-    /// Leaves the rest to later rounds.
-    #[inline(always)]
-    fn postpone(
-        &self,
-        mut alive: u32,
-        at: &impl Fn(usize) -> f32,
-        stack: &mut [[f32; 2]; STACK],
-        count: &mut usize,
-    ) {
-        if *count + 2 * LANES > STACK {
-            // Never lost: one long span instead of many.
-            let first = alive.trailing_zeros() as usize;
-            let last = 32 - alive.leading_zeros() as usize;
-            let (a, b) = (at(first), at(last));
-            let middle = 0.5 * (a + b);
-            if middle > a && middle < b && *count + 2 <= STACK {
-                stack[*count] = [middle, b];
-                stack[*count + 1] = [a, middle];
-                *count += 2;
-            }
-            return;
-        }
-        while alive != 0 {
-            let last = 31 - alive.leading_zeros() as usize;
-            alive &= !(1 << last);
-            stack[*count] = [at(last), at(last + 1)];
-            *count += 1;
-        }
+        0
     }
 
     /// (x, y) and the height at eight parameters of a span.
@@ -465,7 +528,7 @@ impl Span {
             reach: slope.x.max(slope.y),
             bend: 0.25 * bend.x.max(bend.y),
             height_bend: 0.25 * height_bend,
-            rounding: rounding.x.max(rounding.y) + walker.base_rounding,
+            rounding: rounding.x.max(rounding.y) + ROUNDING * walker.base[0].max(walker.base[1]),
             height_rounding,
         }
     }
@@ -477,26 +540,38 @@ struct Ends {
     x: [f32; 16],
     y: [f32; 16],
     h: [f32; 16],
+    /// Texel cells of (x, y).
+    i: [f32; 16],
+    j: [f32; 16],
     /// Largest minus smallest stored texel around each child.
     range: [f32; 16],
 }
 
 impl Ends {
     #[inline(always)]
-    fn new<L: Lanes, const R: usize>(children: usize, x: &[L; R], y: &[L; R], h: &[L; R], range: &[L; R]) -> Self {
+    fn new<L: Lanes, const R: usize>(
+        children: usize,
+        x: &[L; R],
+        y: &[L; R],
+        h: &[L; R],
+        range: &[L; R],
+    ) -> Self {
         let mut ends = Self {
             children,
             x: [0.0; 16],
             y: [0.0; 16],
             h: [0.0; 16],
+            i: [0.0; 16],
+            j: [0.0; 16],
             range: [0.0; 16],
         };
         for r in 0..R {
-            let to = 8 * r..8 * r + 8;
-            ends.x[to.clone()].copy_from_slice(&x[r].to_array());
-            ends.y[to.clone()].copy_from_slice(&y[r].to_array());
-            ends.h[to.clone()].copy_from_slice(&h[r].to_array());
-            ends.range[to].copy_from_slice(&range[r].to_array());
+            ends.x[8 * r..8 * r + 8].copy_from_slice(&x[r].to_array());
+            ends.y[8 * r..8 * r + 8].copy_from_slice(&y[r].to_array());
+            ends.h[8 * r..8 * r + 8].copy_from_slice(&h[r].to_array());
+            ends.i[8 * r..8 * r + 8].copy_from_slice(&x[r].floor().to_array());
+            ends.j[8 * r..8 * r + 8].copy_from_slice(&y[r].floor().to_array());
+            ends.range[8 * r..8 * r + 8].copy_from_slice(&range[r].to_array());
         }
         ends
     }
@@ -506,10 +581,14 @@ impl Ends {
         [self.x[k], self.y[k], self.h[k]]
     }
 
+    #[inline(always)]
+    fn cell(&self, k: usize) -> [f32; 2] {
+        [self.i[k], self.j[k]]
+    }
+
     /// Texel cells that the chord from end `a` to end `b` crosses.
     #[inline(always)]
-    fn cells(&self, a: usize, b: usize) -> i32 {
-        let lines = |c: &[f32; 16]| (c[b].floor() as i32 - c[a].floor() as i32).abs();
-        lines(&self.x).saturating_add(lines(&self.y)).saturating_add(1)
+    fn cells(&self, a: usize, b: usize) -> f32 {
+        (self.i[b] - self.i[a]).abs() + (self.j[b] - self.j[a]).abs() + 1.0
     }
 }
