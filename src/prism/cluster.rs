@@ -23,7 +23,8 @@ pub struct Cluster {
     texcoords: [[[f32; LANES]; 2]; 3],
     /// Bits of the smallest and the largest w: an edit of the map changes them in place.
     offsets: [[AtomicU32; LANES]; 2],
-    prims: [u32; LANES],
+    /// Base triangles, with flags: an edit may set [`FOLDED`].
+    prims: [AtomicU32; LANES],
 }
 
 const _: () = assert!(size_of::<Cluster>() == 108 * LANES);
@@ -61,7 +62,7 @@ impl Cluster {
             normals: [[[0.0; LANES]; 3]; 3],
             texcoords: [[[0.0; LANES]; 2]; 3],
             offsets: Default::default(),
-            prims: std::array::from_fn(of_lane),
+            prims: std::array::from_fn(|l| AtomicU32::new(of_lane(l))),
         };
         for l in 0..LANES {
             let prim = of_lane(l);
@@ -82,20 +83,66 @@ impl Cluster {
             }
             let patch = surface.patch(prim);
             if is_folded(&patch, range.map(f64::from)) {
-                cluster.prims[l] |= FOLDED;
+                *cluster.prims[l].get_mut() |= FOLDED;
             }
             let [a, b, c] = patch.texels;
             if (b - a).abs().max((c - a).abs()).max_element() > LONG_TEXELS {
-                cluster.prims[l] |= LONG;
+                *cluster.prims[l].get_mut() |= LONG;
             }
         }
         cluster
     }
 
+    /// A lane's base triangle with its flags.
+    #[inline(always)]
+    fn flagged(&self, lane: usize) -> u32 {
+        self.prims[lane].load(Ordering::Relaxed)
+    }
+
+    /// Makes room for this range of w on a lane whose prism is over `patch`; whether there was none.
+    pub fn widen(&self, lane: usize, patch: &Patch<'_>, offsets: [f32; 2]) -> bool {
+        let [low, high] = self.offsets(lane);
+        let both = [low.min(offsets[0]), high.max(offsets[1])];
+        // First of all, so that no ray goes by the wider range in the wrong order for longer than it must.
+        if self.is_ordered(lane) && is_folded(patch, both.map(f64::from)) {
+            self.prims[lane].fetch_or(FOLDED, Ordering::Relaxed);
+        }
+        super::edits::widen([&self.offsets[0][lane], &self.offsets[1][lane]], offsets)
+    }
+
+    /// The box around the texture coordinates of all lanes: [low, high] across and up. `None` if one is no finite number.
+    pub fn texcoord_bounds(&self) -> Option<[[f32; 2]; 2]> {
+        let mut zero = 0.0;
+        let bounds = [0, 1].map(|axis| {
+            let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+            for corner in &self.texcoords {
+                for (l, &s) in corner[axis].iter().enumerate() {
+                    low[l] = if s < low[l] { s } else { low[l] };
+                    high[l] = if s > high[l] { s } else { high[l] };
+                }
+            }
+            let least = low.into_iter().fold(f32::INFINITY, f32::min);
+            let most = high.into_iter().fold(f32::NEG_INFINITY, f32::max);
+            [least, most]
+        });
+        for s in self.texcoords.as_flattened().as_flattened() {
+            zero += s * 0.0;
+        }
+        (zero == 0.0).then_some(bounds)
+    }
+
+    /// The same for one lane.
+    pub fn lane_texcoord_bounds(&self, lane: usize) -> [[f32; 2]; 2] {
+        [0, 1].map(|axis| {
+            let [a, b, c] = [0, 1, 2].map(|k: usize| self.texcoords[k][axis][lane]);
+            [a.min(b).min(c), a.max(b).max(c)]
+        })
+    }
+
     /// Base triangle of a lane.
     #[inline(always)]
     pub fn prim(&self, lane: usize) -> u32 {
-        self.prims[lane] & !(FOLDED | LONG)
+        self.flagged(lane) & !(FOLDED | LONG)
     }
 
     /// The range of w of a lane.
@@ -142,13 +189,13 @@ impl Cluster {
     /// Whether t is monotone in w on all rays through a lane's prism.
     #[inline(always)]
     pub fn is_ordered(&self, lane: usize) -> bool {
-        self.prims[lane] & FOLDED == 0
+        self.flagged(lane) & FOLDED == 0
     }
 
     /// Whether f32 tells the texels along any ray through a lane's prism apart.
     #[inline(always)]
     pub fn is_short(&self, lane: usize) -> bool {
-        self.prims[lane] & LONG == 0
+        self.flagged(lane) & LONG == 0
     }
 
     /// One prism's corners in the order of `axes`.
@@ -173,9 +220,8 @@ impl Cluster {
     #[inline(always)]
     pub fn texels(&self, lane: usize, map: &DisplacementMap) -> [DVec2; 3] {
         let [s0, s1, s2] = &self.texcoords;
-        let texel = |s: &[[f32; LANES]; 2]| {
-            map.to_texel(DVec2::new(s[0][lane].into(), s[1][lane].into()))
-        };
+        let texel =
+            |s: &[[f32; LANES]; 2]| map.to_texel(DVec2::new(s[0][lane].into(), s[1][lane].into()));
         [texel(s0), texel(s1), texel(s2)]
     }
 
@@ -271,7 +317,13 @@ mod tests {
     fn groups_are_full_compact_and_hold_every_triangle_once() {
         for count in [1, 7, 8, 9, 16, 17, 100, 1280] {
             let centroids: Vec<DVec3> = (0..count)
-                .map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100)))
+                .map(|i| {
+                    DVec3::new(
+                        f64::from(i % 10),
+                        f64::from(i / 10 % 10),
+                        f64::from(i / 100),
+                    )
+                })
                 .collect();
             let order = groups(&centroids);
             let mut sorted = order.clone();

@@ -67,7 +67,8 @@ impl<L: Lanes> Pairs<L> {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             let first = cross(at_low[i], at_low[j]);
             let last = cross(at_high[i], at_high[j]);
-            let middle = (cross(at_low[i], at_high[j]) + cross(at_high[i], at_low[j])) * L::splat(0.5);
+            let middle =
+                (cross(at_low[i], at_high[j]) + cross(at_high[i], at_low[j])) * L::splat(0.5);
             inside = inside.min(first.max(last).max(middle));
             outside = outside.max(first.min(last).min(middle));
         }

@@ -2,6 +2,7 @@
 
 use super::cluster::{Cluster, groups};
 use super::cull::Pairs;
+use super::edits::EditBounds;
 use super::march::exact::{Found, Problem, root, search};
 use super::ray_frame::RayFrame;
 use super::simd::{LANES, Lanes};
@@ -17,7 +18,7 @@ pub struct ExactPrisms {
 }
 
 impl ExactPrisms {
-    pub fn new(surface: &DisplacedSurface) -> Self {
+    pub fn new(surface: &DisplacedSurface, bounds: EditBounds) -> Self {
         let prims = surface.mesh().triangles().len();
         let centroids: Vec<_> = (0..prims as u32)
             .map(|prim| {
@@ -25,7 +26,10 @@ impl ExactPrisms {
                 a + b + c
             })
             .collect();
-        let offsets = |prim| surface.patch(prim).offsets();
+        let offsets = |prim| {
+            let patch = surface.patch(prim);
+            patch.offsets_of(bounds.range(&patch))
+        };
         Self {
             clusters: groups(&centroids)
                 .chunks(LANES)
@@ -84,8 +88,7 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
         let problem = prisms.problem(cluster, lane, frame.interval, true);
-        if search::<L>(&problem, &frame).is_some()
-        {
+        if search::<L>(&problem, &frame).is_some() {
             return true;
         }
     }

@@ -54,11 +54,7 @@ impl RayFrame {
         let (per_depth, [tnear, tfar]) = self.for_culling();
         let ([x, y, z], [sx, sy]) = (self.origin, self.shear);
         (
-            [
-                L::splat(x as f32),
-                L::splat(y as f32),
-                L::splat(z as f32),
-            ],
+            [L::splat(x as f32), L::splat(y as f32), L::splat(z as f32)],
             [L::splat(sx as f32), L::splat(sy as f32)],
             L::splat(per_depth),
             [L::splat(tnear), L::splat(tfar)],

@@ -86,7 +86,11 @@ impl<'a> Signs<'a> {
         }
         if certain && self.problem.any {
             // Somewhere in the ray's interval: no one asks where.
-            self.nearest = Some(Found { t: 0.0, u: 0.0, v: 0.0 });
+            self.nearest = Some(Found {
+                t: 0.0,
+                u: 0.0,
+                v: 0.0,
+            });
             self.done = true;
             return;
         }
@@ -198,7 +202,11 @@ fn crossing<Q: Quad>(
     // Texels that Newton's next step would go.
     const FINE: f64 = 1e-8;
     const MOST_STEPS: usize = 60;
-    let mut s = if guess >= from && guess <= to { guess } else { 0.5 * (from + to) };
+    let mut s = if guess >= from && guess <= to {
+        guess
+    } else {
+        0.5 * (from + to)
+    };
     let mut at = height(patch, curve, s);
     for _ in 0..MOST_STEPS {
         if (at.g > 0.0) == above {
@@ -211,7 +219,11 @@ fn crossing<Q: Quad>(
             break;
         }
         let newton = s - step;
-        s = if newton >= from && newton <= to { newton } else { 0.5 * (from + to) };
+        s = if newton >= from && newton <= to {
+            newton
+        } else {
+            0.5 * (from + to)
+        };
         at = height(patch, curve, s);
     }
     Found {
