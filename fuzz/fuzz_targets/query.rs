@@ -1,2 +1,118 @@
+//! Any mesh, any map, any ray: what the builders accept is traced without a panic, in bounded time, and every hit is a hit.
+//! The map is edited in between.
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| { let _ = prismarch::prism::SimdLevel::detect(); let _ = data; });
+
+mod input;
+
+use std::sync::Arc;
+
+use input::Input;
+use libfuzzer_sys::fuzz_target;
+use prismarch::bvh::BvhTracer;
+use prismarch::prism::{PrismHit, PrismOptions, Prisms, SimdLevel};
+use prismarch::ray::Ray;
+use prismarch::surface::{DisplacedSurface, DisplacementMap, NormalMode};
+use prismarch::trace::{Object, Placement, Shape, Tracer, World};
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut input = Input(bytes);
+    let _ = run(&mut input);
+});
+
+/// `None` where a builder refuses.
+fn run(input: &mut Input) -> Option<()> {
+    let mode = match input.byte() % 3 {
+        0 => NormalMode::Smooth {
+            crease_angle: input.number(),
+        },
+        _ => NormalMode::File,
+    };
+    let (mesh, _) = input.mesh().build(mode).ok()?;
+    let (width, height, wrap) = (input.side(), input.side(), input.wrap());
+    let kind = input.byte();
+    let texels = input.texels(kind, width * height);
+    let map = Arc::new(DisplacementMap::new(width, height, texels, wrap).ok()?);
+    let displacement = input.displacement();
+    let surface = DisplacedSurface::new(Arc::new(mesh), map.clone(), displacement).ok()?;
+    let surface = Arc::new(surface);
+    let options = input.options();
+
+    let mut both = Vec::new();
+    for level in [SimdLevel::Baseline, SimdLevel::Avx2] {
+        let prisms = Prisms::new(surface.clone(), options).ok()?;
+        both.extend(prisms.with_simd(level).map(Arc::new));
+    }
+    let world = World::new(vec![Object {
+        shape: Shape::Displaced(both[0].clone()),
+        placement: Placement::World,
+        mask: u32::MAX,
+    }]);
+    let mut tracer = BvhTracer::new(&world).ok();
+    for _ in 0..3 {
+        for _ in 0..4 {
+            let ray = input.ray();
+            both.iter().for_each(|prisms| ask(prisms, &ray));
+            if let Some(tracer) = &tracer {
+                let hit = tracer.intersect(&ray);
+                assert_eq!(tracer.occluded(&ray), hit.is_some(), "{ray:?} {hit:?}");
+                if let Some(hit) = hit {
+                    check(&both[0], &ray, hit.prim, [hit.t, hit.u, hit.v], hit.ng);
+                    let point = world.surface_point(&hit);
+                    assert!(!point.position.is_nan(), "{ray:?} {hit:?} {point:?}");
+                }
+            }
+        }
+        if input.is_empty() {
+            return Some(());
+        }
+        let rect = input.rect(width, height);
+        let texels = input.texels(kind, rect.width * rect.height);
+        if map.update(rect, &texels).is_ok() {
+            for prisms in &both {
+                prisms.map_edited(rect);
+                assert_hold(prisms, &surface, options);
+            }
+            tracer = tracer.and_then(|mut tracer| {
+                let edited = tracer.map_edited(&world, &map, rect);
+                edited.is_ok().then_some(tracer)
+            });
+        }
+    }
+    Some(())
+}
+
+/// Asks every primitive about a ray.
+fn ask(prisms: &Prisms, ray: &Ray) {
+    if !ray.is_valid() {
+        return;
+    }
+    for primitive in 0..prisms.len() as u32 {
+        let hit = prisms.intersect(primitive, ray);
+        let occluded = prisms.occluded(primitive, ray);
+        assert_eq!(occluded, hit.is_some(), "{ray:?} {hit:?}");
+        if let Some(PrismHit { prim, t, u, v, ng }) = hit {
+            check(prisms, ray, prim, [t, u, v], ng);
+        }
+    }
+}
+
+fn check(prisms: &Prisms, ray: &Ray, prim: u32, [t, u, v]: [f32; 3], ng: glam::Vec3) {
+    let hit = (ray, prim, t, u, v, ng);
+    assert!(ray.tnear < t && t < ray.tfar && t.is_finite(), "{hit:?}");
+    assert!(u >= 0.0 && v >= 0.0 && u + v <= 1.000_001, "{hit:?}");
+    assert!((ng.length() - 1.0).abs() < 1e-4, "{hit:?}");
+    let triangles = prisms.surface().mesh().triangles().len();
+    assert!((prim as usize) < triangles, "{hit:?}");
+}
+
+/// After an edit every primitive's box holds that of one made anew.
+fn assert_hold(prisms: &Prisms, surface: &Arc<DisplacedSurface>, options: PrismOptions) {
+    let Ok(new) = Prisms::new(surface.clone(), options) else {
+        return;
+    };
+    for primitive in 0..prisms.len() as u32 {
+        let (now, least) = (prisms.bounds(primitive), new.bounds(primitive));
+        let holds = !least.is_valid() || (now.min.cmple(least.min) & now.max.cmpge(least.max)).all();
+        assert!(holds, "{now:?} {least:?}");
+    }
+}

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::engine::EngineArgs;
 use super::error::CliError;
 use super::memory::Memory;
+use crate::prism::{March, PrismOptions, Step};
 use crate::scene::{Loaded, MapFile, ObjectShape};
 
 /// Tell what a scene is made of and what memory it takes
@@ -73,6 +74,9 @@ struct Object {
     name: String,
     triangles: usize,
     displaced: bool,
+    /// How its prisms are made, if it is displaced.
+    march: Option<String>,
+    edit_bounds: Option<&'static str>,
     /// 1 for an object that stands where it is.
     instances: usize,
     material: String,
@@ -109,10 +113,32 @@ fn objects(loaded: &Loaded) -> Vec<Object> {
         name: object.name.clone(),
         triangles: triangles(&object.shape),
         displaced: matches!(object.shape, ObjectShape::Displaced(..)),
+        march: options(&object.shape).map(|options| march(options.march)),
+        edit_bounds: options(&object.shape).map(|options| options.edit_bounds.name()),
         instances: object.instances.len().max(1),
         material: scene.materials[object.material].name.clone(),
     };
     scene.objects.iter().map(object).collect()
+}
+
+fn options(shape: &ObjectShape) -> Option<PrismOptions> {
+    match shape {
+        ObjectShape::Displaced(_, options) => Some(*options),
+        ObjectShape::Plain(_) => None,
+    }
+}
+
+/// `exact`, `uniform, dt 1 texels` or `uniform, dt 0.01 world units, jitter`.
+fn march(march: March) -> String {
+    let March::Uniform { step, jitter } = march else {
+        return "exact".to_owned();
+    };
+    let (size, unit) = match step {
+        Step::Texels(size) => (size, "texels"),
+        Step::World(size) => (size, "world units"),
+    };
+    let jitter = if jitter { ", jitter" } else { "" };
+    format!("uniform, dt {size} {unit}{jitter}")
 }
 
 fn triangles(shape: &ObjectShape) -> usize {
@@ -143,8 +169,13 @@ impl fmt::Display for Info {
                 instances,
                 ..
             } = object;
-            let displaced = if object.displaced { "  displaced" } else { "" };
-            writeln!(f, "  {name:32} {triangles:>11} {instances:>9}{displaced}")?;
+            write!(f, "  {name:32} {triangles:>11} {instances:>9}")?;
+            match (&object.march, object.edit_bounds) {
+                (Some(march), Some(bounds)) => {
+                    writeln!(f, "  displaced: march {march}; edit bounds {bounds}")?;
+                }
+                _ => writeln!(f)?,
+            }
         }
         if !self.maps.is_empty() {
             writeln!(f, "\nmaps")?;

@@ -99,15 +99,15 @@ impl Cluster {
         self.prims[lane].load(Ordering::Relaxed)
     }
 
-    /// Makes room for this range of w on a lane whose prism is over `patch`; whether there was none.
-    pub fn widen(&self, lane: usize, patch: &Patch<'_>, offsets: [f32; 2]) -> bool {
+    /// Makes room for this range of w on a lane whose prism is over `patch`.
+    pub fn widen(&self, lane: usize, patch: &Patch<'_>, offsets: [f32; 2]) {
         let [low, high] = self.offsets(lane);
         let both = [low.min(offsets[0]), high.max(offsets[1])];
         // First of all, so that no ray goes by the wider range in the wrong order for longer than it must.
         if self.is_ordered(lane) && is_folded(patch, both.map(f64::from)) {
             self.prims[lane].fetch_or(FOLDED, Ordering::Relaxed);
         }
-        super::edits::widen([&self.offsets[0][lane], &self.offsets[1][lane]], offsets)
+        super::edits::widen([&self.offsets[0][lane], &self.offsets[1][lane]], offsets);
     }
 
     /// The box around the texture coordinates of all lanes: [low, high] across and up. `None` if one is no finite number.

@@ -86,7 +86,8 @@ impl Prisms {
                     if bounds.is_some_and(|bounds| touch.misses(bounds)) {
                         continue;
                     }
-                    let mut grown = false;
+                    let primitive = index as u32;
+                    let mut before = None;
                     for lane in 0..exact.len(index) {
                         if touch.misses(cluster.lane_texcoord_bounds(lane)) {
                             continue;
@@ -95,11 +96,15 @@ impl Prisms {
                         if map.overlaps(patch.texels, rect) {
                             change.touched += 1;
                             let offsets = patch.offsets_of(self.edit_bounds.range(&patch));
-                            grown |= cluster.widen(lane, &patch, offsets);
+                            if !holds(cluster.offsets(lane), offsets) {
+                                before.get_or_insert_with(|| self.bounds(primitive));
+                                cluster.widen(lane, &patch, offsets);
+                            }
                         }
                     }
-                    if grown {
-                        change.primitives.push(index as u32);
+                    // A prism may grow within the box of its cluster.
+                    if before.is_some_and(|before| before != self.bounds(primitive)) {
+                        change.primitives.push(primitive);
                     }
                 }
             }
@@ -140,6 +145,10 @@ pub(super) fn around(st: [glam::Vec2; 3]) -> [[f32; 2]; 2] {
             [f32::NAN; 2]
         }
     })
+}
+
+fn holds([low, high]: [f32; 2], wanted: [f32; 2]) -> bool {
+    low <= wanted[0] && wanted[1] <= high
 }
 
 /// Widens a range, kept as bits, to hold `wanted`; whether it did not.

@@ -20,7 +20,7 @@ use super::file::{
 use super::load::{FileDisplacement, FileMaterial, FileTexture, load_mesh};
 use super::{Camera, Color, Film, Light, Material, ObjectShape, Scene, SceneObject, Texture};
 use crate::image::{Channel, ColorSpace};
-use crate::prism::March;
+use crate::prism::PrismOptions;
 use crate::surface::{
     BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Projection,
     UvTransform, Wrap,
@@ -62,8 +62,8 @@ pub struct MeshAndMap {
     pub wrap: Wrap,
     /// What heights mean.
     pub displacement: Displacement,
-    /// How it is marched.
-    pub march: March,
+    /// How its prisms are made.
+    pub prisms: PrismOptions,
 }
 
 impl Loaded {
@@ -103,7 +103,7 @@ impl Loaded {
         let material = builder.default_material();
         builder.objects.push(SceneObject {
             name,
-            shape: ObjectShape::Displaced(surface, source.march),
+            shape: ObjectShape::Displaced(surface, source.prisms),
             instances: Vec::new(),
             mask: u32::MAX,
             material,
@@ -273,7 +273,7 @@ impl Builder {
             .heights(path, &channel, wrap.unwrap_or_default())
             .map_err(|e| at.asset(e))?;
         let surface = displaced(name, mesh, &map, displacement).map_err(|e| file.asset(e))?;
-        Ok(ObjectShape::Displaced(surface, table.march))
+        Ok(ObjectShape::Displaced(surface, table.prisms))
     }
 
     /// The index of the material that the scene names.

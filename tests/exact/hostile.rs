@@ -18,9 +18,9 @@ fn mixed(name: &'static str, surface: Arc<DisplacedSurface>) -> Case {
 #[test]
 fn slivers() {
     let stretch = |mesh: MeshBuilder| moved(mesh, Affine3A::from_scale(Vec3::new(1.0, 1e-4, 1.0)));
-    let map = maps::waves(24, Wrap::Clamp);
-    let flat = displaced(stretch(flat(2)), map.clone(), 0.1, 0.0);
-    let bent = displaced(stretch(bent(4)), map, 0.05, 0.2);
+    let map = || maps::waves(24, Wrap::Clamp);
+    let flat = displaced(stretch(flat(2)), map(), 0.1, 0.0);
+    let bent = displaced(stretch(bent(4)), map(), 0.05, 0.2);
     let cases = [mixed("flat slivers", flat), mixed("bent slivers", bent)];
     // Several crossings lie within the strip's width of 1e-4.
     judge(cases.map(|case| Case { same: 1e-5, ..case }));

@@ -6,7 +6,7 @@ use glam::{Affine3A, EulerRot, Quat, Vec3};
 
 use super::{Item, Keyed, STEP_TEXELS, SceneError, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
-use crate::prism::{March, Step};
+use crate::prism::{EditBounds, March, PrismOptions, Step};
 use crate::surface::{Projection, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
@@ -53,7 +53,7 @@ pub(in crate::scene) struct DisplacementTable {
     pub midlevel: Option<f32>,
     pub wrap: Option<Wrap>,
     pub uv: Option<UvTransform>,
-    pub march: March,
+    pub prisms: PrismOptions,
 }
 
 impl MeshTable {
@@ -108,13 +108,21 @@ impl DisplacementTable {
     fn read(item: Item, folder: &Path) -> Result<Self, SceneError> {
         let this = keyed(&item, ());
         let mut section = item.section(&[
-            "map", "channel", "scale", "midlevel", "wrap", "uv", "march", "dt", "dt_world",
+            "map",
+            "channel",
+            "scale",
+            "midlevel",
+            "wrap",
+            "uv",
+            "march",
+            "dt",
+            "dt_world",
             "jitter",
+            "edit_bounds",
         ])?;
-        // There is one march so far: the word is checked, and says nothing else.
-        section.optional("march", |i| i.word(&[("uniform", ())]))?;
-        let step = step(&mut section)?;
-        let jitter = section.optional("jitter", |i| i.boolean())?;
+        let march = march(&mut section)?;
+        let words = [EditBounds::Tight, EditBounds::Range].map(|b| (b.name(), b));
+        let edit_bounds = section.optional("edit_bounds", |i| i.word(&words))?;
         Ok(Self {
             this,
             map: section.optional("map", |i| file_path(&i, folder))?,
@@ -123,9 +131,9 @@ impl DisplacementTable {
             midlevel: section.optional("midlevel", |i| i.number("a height", |_| true))?,
             wrap: section.optional("wrap", wrap)?,
             uv: section.optional("uv", uv_transform)?,
-            march: March::Uniform {
-                step,
-                jitter: jitter.unwrap_or(false),
+            prisms: PrismOptions {
+                march,
+                edit_bounds: edit_bounds.unwrap_or_default(),
             },
         })
     }
@@ -137,21 +145,44 @@ fn channel(item: Item) -> Result<Channel, SceneError> {
     Ok(channel)
 }
 
-/// `dt` or `dt_world`; 1 texel by default.
-fn step(section: &mut super::Section) -> Result<Step, SceneError> {
+/// `march`, and what belongs to the uniform one: a step or its jitter choose it where no march is named.
+fn march(section: &mut super::Section) -> Result<March, SceneError> {
+    let words = [("exact", false), ("uniform", true)];
+    let uniform = section.optional("march", |i| i.word(&words))?;
+    if uniform == Some(false) {
+        for key in ["dt", "dt_world", "jitter"] {
+            if let Some(item) = section.get(key) {
+                let found = format!("{key} beside march = \"exact\"");
+                return Err(item.error(found, "march = \"uniform\"; the exact march has no step"));
+            }
+        }
+    }
+    let step = step(section)?;
+    let jitter = section.optional("jitter", |i| i.boolean())?;
+    if uniform != Some(true) && step.is_none() && jitter.is_none() {
+        return Ok(March::Exact);
+    }
+    Ok(March::Uniform {
+        step: step.unwrap_or(Step::Texels(1.0)),
+        jitter: jitter.unwrap_or(false),
+    })
+}
+
+/// `dt` or `dt_world`.
+fn step(section: &mut super::Section) -> Result<Option<Step>, SceneError> {
     let texels = section.optional("dt", |i| {
         let (low, high) = (STEP_TEXELS.start(), STEP_TEXELS.end());
         let expected = format!("texels per step, from {low} to {high}");
         i.number(&expected, |x| STEP_TEXELS.contains(&x))
     })?;
     let Some(item) = section.get("dt_world") else {
-        return Ok(Step::Texels(texels.unwrap_or(1.0)));
+        return Ok(texels.map(Step::Texels));
     };
     if texels.is_some() {
         return Err(item.error("dt and dt_world", "only one of them"));
     }
     let length = item.number("world units per step, above 0", |x| x > 0.0)?;
-    Ok(Step::World(length))
+    Ok(Some(Step::World(length)))
 }
 
 fn instances(item: Item) -> Result<Vec<Affine3A>, SceneError> {
