@@ -9,6 +9,7 @@
 //! off by at most 6 u (depth + R + ...) with u = 2^-23, R the largest projected coordinate; a cross product of two by four
 //! times R times that, and its own two roundings. The slack below is that sum, rounded up.
 
+use super::ray_frame::RayLanes;
 use super::simd::Lanes;
 
 /// Eight (ray, prism) pairs.
@@ -19,14 +20,8 @@ pub struct Pairs<L> {
     pub normals: [[L; 3]; 3],
     /// Smallest and largest w.
     pub offsets: [L; 2],
-    /// The ray's origin, the same way.
-    pub origin: [L; 3],
-    /// How far the ray moves along the lateral axes per unit along the main axis: at most 1 in magnitude.
-    pub shear: [L; 2],
-    /// Ray parameter per unit along the main axis.
-    pub per_depth: L,
-    /// tnear and tfar.
-    pub interval: [L; 2],
+    /// The ray, along the same axes.
+    pub ray: RayLanes<L>,
 }
 
 impl<L: Lanes> Pairs<L> {
@@ -42,15 +37,15 @@ impl<L: Lanes> Pairs<L> {
         let (mut widest, mut deepest) = (zero, zero);
         let (mut nearest, mut farthest) = (L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY));
         for k in 0..3 {
-            let depth = self.vertices[k][2] - self.origin[2];
+            let depth = self.vertices[k][2] - self.ray.origin[2];
             let slope = self.normals[k][2];
             deepest = deepest.max(depth.abs());
             let (d0, d1) = (low.mul_add(slope, depth), high.mul_add(slope, depth));
             nearest = nearest.min(d0.min(d1));
             farthest = farthest.max(d0.max(d1));
             for axis in 0..2 {
-                let shear = zero - self.shear[axis];
-                let a = depth.mul_add(shear, self.vertices[k][axis] - self.origin[axis]);
+                let shear = zero - self.ray.shear[axis];
+                let a = depth.mul_add(shear, self.vertices[k][axis] - self.ray.origin[axis]);
                 let e = slope.mul_add(shear, self.normals[k][axis]);
                 widest = widest.max(a.abs());
                 at_low[k][axis] = low.mul_add(e, a);
@@ -67,17 +62,16 @@ impl<L: Lanes> Pairs<L> {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             let first = cross(at_low[i], at_low[j]);
             let last = cross(at_high[i], at_high[j]);
-            let middle =
-                (cross(at_low[i], at_high[j]) + cross(at_high[i], at_low[j])) * L::splat(0.5);
+            let middle = (cross(at_low[i], at_high[j]) + cross(at_high[i], at_low[j])) * L::splat(0.5);
             inside = inside.min(first.max(last).max(middle));
             outside = outside.max(first.min(last).min(middle));
         }
         let counter_clockwise = !(inside + slack).sign_mask();
         let clockwise = !(slack - outside).sign_mask();
 
-        let (t0, t1) = (nearest * self.per_depth, farthest * self.per_depth);
-        let slack = coordinate * self.per_depth.abs() * L::splat(2.0);
-        let [tnear, tfar] = self.interval;
+        let (t0, t1) = (nearest * self.ray.per_depth, farthest * self.ray.per_depth);
+        let slack = coordinate * self.ray.per_depth.abs() * L::splat(2.0);
+        let [tnear, tfar] = self.ray.interval;
         let too_early = (t0.max(t1) + slack - tnear).sign_mask();
         let too_late = (tfar - (t0.min(t1) - slack)).sign_mask();
         (counter_clockwise | clockwise) & !too_early & !too_late

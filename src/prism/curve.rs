@@ -184,10 +184,16 @@ impl<Q: Quad> View<Q> {
                 counter_clockwise: above == 7,
             });
         }
-        match (below == 0, above == 0) {
-            (true, true) => Cut::Many,
-            (false, false) => Cut::None,
-            (counter_clockwise, _) => self.cut_by_sides([low, high], counter_clockwise),
+        let found = if below == 0 {
+            self.cut_by_sides([low, high], true)
+        } else {
+            Cut::None
+        };
+        match found {
+            Cut::None if above == 0 => self.cut_by_sides([low, high], false),
+            // The triangle may turn over within the range.
+            Cut::One(_) if above == 0 => Cut::Many,
+            found => found,
         }
     }
 
@@ -315,8 +321,8 @@ impl<Q: Quad> View<Q> {
         for pair in cuts[..count + 1].windows(2) {
             let [(from, start), (to, end)] = [pair[0], pair[1]];
             let s = 0.5 * (from + to);
-            let inside =
-                (0..3).all(|k| constant >> k & 1 != 0 || c0[k] + s * (c1[k] + s * c2[k]) >= 0.0);
+            let inside = (0..3)
+                .all(|k| constant >> k & 1 != 0 || c0[k] + s * (c1[k] + s * c2[k]) >= 0.0);
             if !inside {
                 if let Some(done) = stretch.take() {
                     found.push(done);

@@ -4,7 +4,7 @@ use super::cluster::{Cluster, groups};
 use super::cull::Pairs;
 use super::edits::EditBounds;
 use super::march::exact::{Found, Problem, root, search};
-use super::ray_frame::RayFrame;
+use super::ray_frame::{RayFrame, RayLanes, axes};
 use super::simd::{LANES, Lanes};
 use super::{Parts, PrismHit, Prisms};
 use crate::ray::Ray;
@@ -52,9 +52,13 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     let Parts::Exact(exact) = &prisms.parts else {
         return None;
     };
-    let (cluster, frame) = (&exact.clusters[index as usize], RayFrame::new(ray));
-    let mut interval = frame.interval;
-    let mut alive = meeting::<L>(cluster, &frame) & ((1 << exact.len(index as usize)) - 1);
+    let (cluster, axes) = (&exact.clusters[index as usize], axes(ray));
+    let mut alive = meeting::<L>(cluster, ray, axes) & ((1 << exact.len(index as usize)) - 1);
+    if alive == 0 {
+        return None;
+    }
+    let frame = RayFrame::new(ray, axes);
+    let mut interval = [ray.tnear, ray.tfar];
     let mut nearest: Option<(Found, usize)> = None;
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
@@ -67,7 +71,7 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
             });
             if beats {
                 nearest = Some((found, lane));
-                interval[1] = (found.t as f32).next_up().min(frame.interval[1]);
+                interval[1] = (found.t as f32).next_up().min(ray.tfar);
             }
         }
     }
@@ -82,13 +86,18 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
     let Parts::Exact(exact) = &prisms.parts else {
         return false;
     };
-    let (cluster, frame) = (&exact.clusters[index as usize], RayFrame::new(ray));
-    let mut alive = meeting::<L>(cluster, &frame) & ((1 << exact.len(index as usize)) - 1);
+    let (cluster, axes) = (&exact.clusters[index as usize], axes(ray));
+    let mut alive = meeting::<L>(cluster, ray, axes) & ((1 << exact.len(index as usize)) - 1);
+    if alive == 0 {
+        return false;
+    }
+    let frame = RayFrame::new(ray, axes);
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
-        let problem = prisms.problem(cluster, lane, frame.interval, true);
-        if search::<L>(&problem, &frame).is_some() {
+        let problem = prisms.problem(cluster, lane, [ray.tnear, ray.tfar], true);
+        if search::<L>(&problem, &frame).is_some()
+        {
             return true;
         }
     }
@@ -97,17 +106,13 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
 
 /// The lanes whose prisms the ray may meet.
 #[inline(always)]
-fn meeting<L: Lanes>(cluster: &Cluster, frame: &RayFrame) -> u32 {
-    let (vertices, normals, offsets) = cluster.lanes::<L>(frame.axes);
-    let (origin, shear, per_depth, interval) = frame.splat::<L>();
+fn meeting<L: Lanes>(cluster: &Cluster, ray: &Ray, axes: [usize; 3]) -> u32 {
+    let (vertices, normals, offsets) = cluster.lanes::<L>(axes);
     Pairs {
         vertices,
         normals,
         offsets,
-        origin,
-        shear,
-        per_depth,
-        interval,
+        ray: RayLanes::splat(ray, axes),
     }
     .may_meet()
 }

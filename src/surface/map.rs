@@ -212,8 +212,10 @@ impl DisplacementMap {
     pub fn sample(&self, p: DVec2) -> HeightSample {
         let (i, fx, sx) = self.cell(p.x, self.width);
         let (j, fy, sy) = self.cell(p.y, self.height);
-        let corner = |di: usize, dj: usize| f64::from(self.raw(i + di, j + dj));
-        let (h00, h10, h01, h11) = (corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1));
+        let stride = self.stride();
+        let [h00, h10, h01, h11] = self.texels.cell(j * stride + i, stride);
+        let (h00, h10) = (f64::from(h00), f64::from(h10));
+        let (h01, h11) = (f64::from(h01), f64::from(h11));
         let (bottom, top) = (h00 + fx * (h10 - h00), h01 + fx * (h11 - h01));
         let dx = (h10 - h00) + fy * ((h11 - h01) - (h10 - h00));
         let unit = 1.0 / f64::from(self.unit());
@@ -234,19 +236,24 @@ impl DisplacementMap {
         )
     }
 
-    /// Stored texel of column `i` in 0..=width and row `j` in 0..=height.
-    #[inline(always)]
-    fn raw(&self, i: usize, j: usize) -> f32 {
-        self.texels.get(j * self.stride() + i)
-    }
-
     /// The cell of coordinate `x` along a side of `n` texels, the position in it, and how fast it moves with x.
     #[inline(always)]
     fn cell(&self, x: f64, n: usize) -> (usize, f64, f64) {
+        if x >= 0.0 && x < n as f64 - 1.0 {
+            let cell = x.floor();
+            return (whole(cell), x - cell, 1.0);
+        }
         let (folded, slope) = self.wrap.fold(x, n as f64);
-        let i = (folded.floor() as usize).min(n - 1);
+        let i = whole(folded.floor()).min(n - 1);
         (i, folded - i as f64, slope)
     }
+}
+
+/// A whole number from 0 to 2^32 - 1: the low bits of its sum with 2^52, without the checks of `as`.
+#[inline(always)]
+fn whole(x: f64) -> usize {
+    const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
+    (x + TWO_TO_52).to_bits() as u32 as usize
 }
 
 #[cfg(test)]

@@ -198,6 +198,27 @@ impl StoredTexels {
         }
     }
 
+    /// The texels at the corners (0,0) (1,0) (0,1) (1,1) of the cell at `index`, as stored.
+    #[inline(always)]
+    pub fn cell(&self, index: usize, stride: usize) -> [f32; 4] {
+        #[inline(always)]
+        fn corners<T: Texel>(t: &[T::Atomic], index: usize, stride: usize) -> [f32; 4] {
+            // One check for all four.
+            let t = &t[index..index + stride + 2];
+            [
+                T::load(&t[0]).into(),
+                T::load(&t[1]).into(),
+                T::load(&t[stride]).into(),
+                T::load(&t[stride + 1]).into(),
+            ]
+        }
+        match self {
+            Self::U8(t) => corners::<u8>(t, index, stride),
+            Self::U16(t) => corners::<u16>(t, index, stride),
+            Self::F32(t) => corners::<f32>(t, index, stride),
+        }
+    }
+
     /// Texel `index` as stored.
     #[inline(always)]
     pub fn get(&self, index: usize) -> f32 {

@@ -57,13 +57,7 @@ impl Chord {
         let (dx, dy, dh) = (x1 - x0, y1 - y0, h1 - h0);
         // Positions relative to the first cell: few digits before the point.
         let (x0, y0) = (x0 - i0, y0 - j0);
-        let inverse = |d: f32| {
-            1.0 / if d.abs() < 1e-12 {
-                1e-12f32.copysign(d)
-            } else {
-                d
-            }
-        };
+        let inverse = |d: f32| 1.0 / if d.abs() < 1e-12 { 1e-12f32.copysign(d) } else { d };
         let (per_x, per_y) = (inverse(dx), inverse(dy));
         let (step_x, step_y) = (1f32.copysign(dx), 1f32.copysign(dy));
         // The line of its cell through which the chord leaves: the right and upper one, or the left and lower one.
@@ -111,7 +105,9 @@ impl Chord {
         let discriminant = g1 * g1 - L::splat(4.0) * g0 * g2;
         let crosses = g0.sign_mask() | at_end.sign_mask();
         // The parabola turns between the ends, upward, and has a root.
-        let turns = g1.sign_mask() & !(g1 + g2 + g2).sign_mask() & !discriminant.sign_mask();
+        let turns = g1.sign_mask()
+            & !(g1 + g2 + g2).sign_mask()
+            & !discriminant.sign_mask();
         let used = (1u32 << (nx + ny + 1.0) as u32) - 1;
         let possible = (crosses | turns) & used;
         if possible == 0 {

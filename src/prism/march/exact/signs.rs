@@ -22,15 +22,12 @@ pub struct Signs<'a> {
     done: bool,
 }
 
-/// g and its derivative, with what they were made of.
+/// g and its derivative by s.
 struct Height {
     g: f64,
     slope: f64,
-    u: f64,
-    v: f64,
     /// Texels per unit of s.
     speed: f64,
-    t: f64,
 }
 
 impl<'a> Signs<'a> {
@@ -86,11 +83,7 @@ impl<'a> Signs<'a> {
         }
         if certain && self.problem.any {
             // Somewhere in the ray's interval: no one asks where.
-            self.nearest = Some(Found {
-                t: 0.0,
-                u: 0.0,
-                v: 0.0,
-            });
+            self.nearest = Some(Found { t: 0.0, u: 0.0, v: 0.0 });
             self.done = true;
             return;
         }
@@ -121,7 +114,6 @@ fn height<Q: Quad>(patch: &Patch<'_>, curve: &Curve<Q>, s: f64) -> Height {
     // (n / A)' = (n' - (n / A) A') / A.
     let change = (place_change - place * depth_change.broadcast::<0>()) * inverse;
     let ([x, y, u, v], [dx, dy, du, dv]) = (place.to_array(), change.to_array());
-    let [_, z, zn, _] = (depth * inverse).to_array();
     let w = curve.w(s);
 
     let (n1, n2) = (
@@ -138,10 +130,7 @@ fn height<Q: Quad>(patch: &Patch<'_>, curve: &Curve<Q>, s: f64) -> Height {
         g: w * length * per_height + patch.midlevel - sample.height,
         slope: (curve.w[1] * length + w * stretch) * per_height
             - (sample.gradient.x * dx + sample.gradient.y * dy),
-        u,
-        v,
         speed: dx.abs().max(dy.abs()),
-        t: (z + w * zn) * curve.per_depth,
     }
 }
 
@@ -199,36 +188,38 @@ fn crossing<Q: Quad>(
     guess: f64,
     above: bool,
 ) -> Found {
-    // Texels that Newton's next step would go.
-    const FINE: f64 = 1e-8;
+    // Newton's error is about the square of its step, in texels: what is left after a step of this length is below what
+    // f32 tells apart.
+    const FINE: f64 = 1.0 / 2048.0;
     const MOST_STEPS: usize = 60;
     let mut s = if guess >= from && guess <= to {
         guess
     } else {
         0.5 * (from + to)
     };
-    let mut at = height(patch, curve, s);
     for _ in 0..MOST_STEPS {
+        let at = height(patch, curve, s);
         if (at.g > 0.0) == above {
             from = s;
         } else {
             to = s;
         }
         let step = at.g / at.slope;
+        let newton = s - step;
+        if !(newton >= from && newton <= to) {
+            s = 0.5 * (from + to);
+            continue;
+        }
+        s = newton;
         if step.abs() * at.speed.max(1.0) <= FINE || to - from <= f64::EPSILON {
             break;
         }
-        let newton = s - step;
-        s = if newton >= from && newton <= to {
-            newton
-        } else {
-            0.5 * (from + to)
-        };
-        at = height(patch, curve, s);
     }
+    let (place, depth) = curve.at(s);
+    let ([_, _, u, v], [_, z, zn, _]) = (place.to_array(), depth.to_array());
     Found {
-        t: at.t,
-        u: at.u,
-        v: at.v,
+        t: (z + curve.w(s) * zn) * curve.per_depth,
+        u,
+        v,
     }
 }
