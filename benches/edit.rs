@@ -1,9 +1,10 @@
 //! From an edit of the map to the first ray that sees it: `cargo bench --bench edit`.
 //!
 //! The unit sphere of the other benches (1280 prisms, a 16-bit map of rock); an edit is 64 x 64 texels somewhere on the map. It
-//! either stays within the heights that its prisms hold (the texels are turned by half a turn), or goes beyond (they become
-//! a hill up to the map's largest height). Beside it, in the same rounds: all primary rays of a picture on two threads.
-//! Options after `--`: `--map TEXELS`, `--size PIXELS`, `--rounds N`. Prints Markdown tables.
+//! either stays within the heights that its prisms hold (the texels become their mean), or goes beyond (they become a hill up to the
+//! map's largest height). Beside it, in the same rounds: all primary rays of a picture on two threads.
+//! Options after `--`: `--map TEXELS`, `--size PIXELS`, `--rounds N`, `--subdivisions N` (of the
+//! sphere: 20 * 4^N prisms). Prints Markdown tables.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -73,7 +74,7 @@ fn main() {
     let map = rock_map(option("--map", 4096), 1);
     let size = option("--size", 1024) as u32;
     let rounds = option("--rounds", 15) as u32;
-    let mesh = sphere(3);
+    let mesh = sphere(option("--subdivisions", 3) as u32);
     type Build = fn(&World) -> Box<dyn Editable>;
     let embree: Build = |world| build_embree(world, false);
     let editable: Build = |world| build_embree(world, true);
@@ -166,7 +167,10 @@ fn edited(old: &Texels, edit: Edit) -> Texels {
         panic!("the map of rock has 16 bits");
     };
     Texels::U16(match edit {
-        Edit::Within => old.iter().rev().copied().collect(),
+        Edit::Within => {
+            let sum: usize = old.iter().map(|&h| usize::from(h)).sum();
+            vec![(sum / old.len()) as u16; old.len()]
+        }
         Edit::Beyond => (0..SIDE * SIDE)
             .map(|i| {
                 let from_middle = |i: usize| i.abs_diff(SIDE / 2) as f32 / (SIDE / 2) as f32;

@@ -1,8 +1,8 @@
-//! Edits of a map in place: a tracer that was told traces what one built afterwards does, bit for bit.
+//! Edits of a map in place: a tracer that was told traces what one built afterwards over the same prisms does, bit for bit,
+//! and what one over new prisms does, up to rounding where those have narrower ranges.
 #![cfg(feature = "bvh")]
 
 #[path = "../benches/common/mod.rs"]
-#[allow(dead_code)] // of what benches and other tests use
 mod common;
 
 use std::sync::Arc;
@@ -117,7 +117,13 @@ fn law<T: Tracer>(
         let edited = told(&mut tracer, &world, &stage.map, rect);
         assert_eq!(edited.committed, before != bounds(&world), "{rect}");
         commits += u32::from(edited.committed);
-        assert_like_new(&tracer, &build(&stage.world(edit_bounds)), number);
+        assert_same(&tracer, &build(&world), number);
+        assert_like(
+            &tracer,
+            &build(&stage.world(edit_bounds)),
+            edit_bounds,
+            number,
+        );
         // Told twice, it has nothing left to do.
         let nothing = told(&mut tracer, &world, &stage.map, rect);
         assert!(!nothing.committed);
@@ -145,7 +151,13 @@ fn law<T: Tracer>(
         let edited = told(&mut tracer, &world, &stage.map, rect);
         assert!(!edited.committed);
         assert_eq!(edited.prims_touched > 0, edit_bounds == EditBounds::Tight);
-        assert_like_new(&tracer, &build(&stage.world(edit_bounds)), number);
+        assert_same(&tracer, &build(&world), number);
+        assert_like(
+            &tracer,
+            &build(&stage.world(edit_bounds)),
+            edit_bounds,
+            number,
+        );
     }
 }
 
@@ -157,8 +169,24 @@ fn bounds(world: &World) -> Vec<prismarch::ray::Aabb> {
     world.objects().iter().flat_map(of).collect()
 }
 
+/// `tracer` against one over new prisms. Where those have narrower ranges, roots are rounded from elsewhere.
+fn assert_like(tracer: &impl Tracer, new: &impl Tracer, edit_bounds: EditBounds, seed: u32) {
+    if edit_bounds == EditBounds::Range {
+        return assert_same(tracer, new, seed);
+    }
+    let mut grazes = 0;
+    for ray in rays(seed.wrapping_mul(0x1234_5677)) {
+        match (tracer.intersect(&ray), new.intersect(&ray)) {
+            (None, None) => {}
+            (Some(a), Some(b)) if (a.t - b.t).abs() <= 2e-6 * b.t => {}
+            _ => grazes += 1,
+        }
+    }
+    assert!(grazes <= 1, "{grazes}");
+}
+
 /// The hits of `tracer` are those of `new`, but for the name of what is hit twice at the same t.
-fn assert_like_new(tracer: &impl Tracer, new: &impl Tracer, seed: u32) {
+fn assert_same(tracer: &impl Tracer, new: &impl Tracer, seed: u32) {
     let mut hits = 0;
     for ray in rays(seed.wrapping_mul(0x1234_5677)) {
         let (a, b) = (tracer.intersect(&ray), new.intersect(&ray));
@@ -232,6 +260,8 @@ mod embree {
                 .committed
         );
         assert!(bvh.map_edited(&world, &stage.map, rect).unwrap().committed);
-        assert_like_new(&bvh, &BvhTracer::new(&world).unwrap(), 3);
+        assert_same(&bvh, &BvhTracer::new(&world).unwrap(), 3);
+        // Instances round differently: the box will do.
+        assert!((embree.bounds().max - bvh.bounds().max).abs().max_element() < 1e-4);
     }
 }

@@ -68,8 +68,10 @@ impl Input<'_> {
         }
     }
 
+    /// Texture coordinates: a surface over 10^15 texels is traced for hours, and no fault is in that.
     fn vec2(&mut self) -> Vec2 {
-        Vec2::new(self.finite(), self.finite())
+        const REACH: f32 = 1e3;
+        Vec2::new(self.finite(), self.finite()).clamp(Vec2::splat(-REACH), Vec2::splat(REACH))
     }
 
     fn vec3(&mut self) -> Vec3 {

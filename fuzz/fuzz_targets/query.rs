@@ -1,5 +1,5 @@
 //! Any mesh, any map, any ray: what the builders accept is traced without a panic, in bounded time, and every hit is a hit.
-//! The map is edited in between.
+//! The map is edited in between. With FUZZ_SHOW in the environment everything is printed first.
 #![no_main]
 
 mod input;
@@ -19,6 +19,13 @@ fuzz_target!(|bytes: &[u8]| {
     let _ = run(&mut input);
 });
 
+/// Prints what a crash was made from.
+fn show(what: &dyn std::fmt::Debug) {
+    if std::env::var_os("FUZZ_SHOW").is_some() {
+        eprintln!("{what:?}");
+    }
+}
+
 /// `None` where a builder refuses.
 fn run(input: &mut Input) -> Option<()> {
     let mode = match input.byte() % 3 {
@@ -27,15 +34,19 @@ fn run(input: &mut Input) -> Option<()> {
         },
         _ => NormalMode::File,
     };
-    let (mesh, _) = input.mesh().build(mode).ok()?;
+    let mesh = input.mesh();
+    show(&(mode, &mesh));
+    let (mesh, _) = mesh.build(mode).ok()?;
     let (width, height, wrap) = (input.side(), input.side(), input.wrap());
     let kind = input.byte();
     let texels = input.texels(kind, width * height);
+    show(&(width, height, wrap, &texels));
     let map = Arc::new(DisplacementMap::new(width, height, texels, wrap).ok()?);
     let displacement = input.displacement();
     let surface = DisplacedSurface::new(Arc::new(mesh), map.clone(), displacement).ok()?;
     let surface = Arc::new(surface);
     let options = input.options();
+    show(&(displacement, options));
 
     let mut both = Vec::new();
     for level in [SimdLevel::Baseline, SimdLevel::Avx2] {
@@ -51,6 +62,7 @@ fn run(input: &mut Input) -> Option<()> {
     for _ in 0..3 {
         for _ in 0..4 {
             let ray = input.ray();
+            show(&ray);
             both.iter().for_each(|prisms| ask(prisms, &ray));
             if let Some(tracer) = &tracer {
                 let hit = tracer.intersect(&ray);
@@ -67,6 +79,7 @@ fn run(input: &mut Input) -> Option<()> {
         }
         let rect = input.rect(width, height);
         let texels = input.texels(kind, rect.width * rect.height);
+        show(&(rect, &texels));
         if map.update(rect, &texels).is_ok() {
             for prisms in &both {
                 prisms.map_edited(rect);

@@ -78,6 +78,10 @@ impl Prisms {
         {
             return change;
         }
+        // What is not in the map was never edited.
+        let Ok(edited) = map.range_in(rect) else {
+            return change;
+        };
         let touch = Touch::new(map, rect);
         match &self.parts {
             Parts::Exact(exact) => {
@@ -95,8 +99,13 @@ impl Prisms {
                         let patch = self.surface.patch(cluster.prim(lane));
                         if map.overlaps(patch.texels, rect) {
                             change.touched += 1;
+                            // There is room for all other texels: these alone decide, if all of them fit.
+                            let stored = cluster.offsets(lane);
+                            if holds(stored, patch.offsets_of(patch.displacements(edited))) {
+                                continue;
+                            }
                             let offsets = patch.offsets_of(self.edit_bounds.range(&patch));
-                            if !holds(cluster.offsets(lane), offsets) {
+                            if !holds(stored, offsets) {
                                 before.get_or_insert_with(|| self.bounds(primitive));
                                 cluster.widen(lane, &patch, offsets);
                             }
@@ -116,7 +125,9 @@ impl Prisms {
                     let patch = self.surface.patch(prim);
                     if map.overlaps(patch.texels, rect) {
                         change.touched += 1;
-                        if record.widen(self.edit_bounds.range(&patch)) {
+                        if !record.holds(patch.displacements(edited))
+                            && record.widen(self.edit_bounds.range(&patch))
+                        {
                             change.primitives.push(prim);
                         }
                     }
@@ -147,7 +158,8 @@ pub(super) fn around(st: [glam::Vec2; 3]) -> [[f32; 2]; 2] {
     })
 }
 
-fn holds([low, high]: [f32; 2], wanted: [f32; 2]) -> bool {
+/// Whether a range holds another.
+pub(super) fn holds([low, high]: [f32; 2], wanted: [f32; 2]) -> bool {
     low <= wanted[0] && wanted[1] <= high
 }
 
