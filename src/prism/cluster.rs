@@ -112,23 +112,25 @@ impl Cluster {
 
     /// The box around the texture coordinates of all lanes: [low, high] across and up. `None` if one is no finite number.
     pub fn texcoord_bounds(&self) -> Option<[[f32; 2]; 2]> {
-        let mut zero = 0.0;
+        // NaN where a coordinate is no finite number. By lanes: a sum of one lane would wait for itself.
+        let mut zero = [0.0; LANES];
         let bounds = [0, 1].map(|axis| {
             let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
             for corner in &self.texcoords {
                 for (l, &s) in corner[axis].iter().enumerate() {
                     low[l] = if s < low[l] { s } else { low[l] };
                     high[l] = if s > high[l] { s } else { high[l] };
+                    zero[l] += 0.0 * s;
                 }
             }
-            let least = low.into_iter().fold(f32::INFINITY, f32::min);
-            let most = high.into_iter().fold(f32::NEG_INFINITY, f32::max);
-            [least, most]
+            let least = |a: f32, b: f32| if b < a { b } else { a };
+            let most = |a: f32, b: f32| if b > a { b } else { a };
+            [
+                low.into_iter().fold(f32::INFINITY, least),
+                high.into_iter().fold(f32::NEG_INFINITY, most),
+            ]
         });
-        for s in self.texcoords.as_flattened().as_flattened() {
-            zero += s * 0.0;
-        }
-        (zero == 0.0).then_some(bounds)
+        (zero == [0.0; LANES]).then_some(bounds)
     }
 
     /// The same for one lane.
