@@ -3,9 +3,7 @@
 use glam::{Vec2, Vec3};
 use prismarch::prism::{EditBounds, March, PrismOptions, Step};
 use prismarch::ray::Ray;
-use prismarch::surface::{
-    Displacement, MeshBuilder, TexelRect, Texels, UvTransform, Wrap,
-};
+use prismarch::surface::{Displacement, MeshBuilder, TexelRect, Texels, UvTransform, Wrap};
 
 pub struct Input<'b>(pub &'b [u8]);
 
