@@ -145,12 +145,14 @@ fn bvh(world: &World) -> BvhTracer {
     BvhTracer::new(world).expect("obvhs builds the sphere")
 }
 
-/// A scene of the quality at which Embree refits instead of building anew.
+/// A scene of the quality at which Embree refits instead of building anew; it must be dynamic too, or every commit drops the
+/// trees that there are.
 fn refittable(prisms: &Arc<Prisms>) -> Scene {
     let build = || {
         let device = Device::new(&DeviceOptions::default())?;
         let options = SceneOptions {
             quality: BuildQuality::Low,
+            dynamic: true,
             ..SceneOptions::default()
         };
         let mut builder = SceneBuilder::new(&device, options)?;

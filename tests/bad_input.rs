@@ -266,6 +266,26 @@ fn scene_files_are_held_to_their_keys() {
         ),
         (
             "scale = 0.2",
+            "scale = 0.2\nmarch = \"exact\"\ndt = 1",
+            ["displacement.dt", "march = \"exact\"", "no step"],
+        ),
+        (
+            "scale = 0.2",
+            "scale = 0.2\njitter = true\nmarch = \"exact\"",
+            ["displacement.jitter", "march = \"exact\"", "no step"],
+        ),
+        (
+            "scale = 0.2",
+            "scale = 0.2\nmarch = \"best\"",
+            ["displacement.march", "\"best\"", "\"uniform\""],
+        ),
+        (
+            "scale = 0.2",
+            "scale = 0.2\nedit_bounds = \"loose\"",
+            ["edit_bounds", "\"loose\"", "\"range\""],
+        ),
+        (
+            "scale = 0.2",
             "midlevel = 0.2",
             ["mesh[0].displacement", "no scale", "scale ="],
         ),

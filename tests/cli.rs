@@ -2,6 +2,7 @@
 
 mod program;
 
+use prismarch::image::write_png_gray16;
 use program::{FLAT, Folder, SCENE, stderr, stdout};
 
 /// Runs the program, which must succeed, and gives its standard output.
@@ -64,6 +65,9 @@ fn help_names_verbs_options_and_examples() {
                 "--backend",
                 "--stats",
                 "--quiet",
+                "--march",
+                "--dt",
+                "--dt-world",
             ],
         ),
         (
@@ -241,6 +245,55 @@ fn the_same_seed_jitters_the_same_way() {
     assert!(run("8").lines().count() == 2);
 }
 
+/// What the marches of a scene are, as `info` has it.
+fn march_of(folder: &Folder, keys: &str) -> (serde_json::Value, serde_json::Value) {
+    folder.put(
+        "scene.toml",
+        SCENE.replace("scale = 0.2", &format!("scale = 0.2\n{keys}")),
+    );
+    let info = done(folder, &["info", "scene.toml", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&info).unwrap();
+    let object = &info["objects"][0];
+    (object["march"].clone(), object["edit_bounds"].clone())
+}
+
+#[test]
+fn info_names_march_and_bounds() {
+    let folder = Folder::with_quad();
+    let of = |keys| march_of(&folder, keys);
+    assert_eq!(of(""), ("exact".into(), "tight".into()));
+    let uniform = "uniform, dt 1 texels";
+    assert_eq!(of("march = \"uniform\"").0, uniform);
+    assert_eq!(
+        of("dt_world = 0.5\njitter = true").0,
+        "uniform, dt 0.5 world units, jitter"
+    );
+    assert_eq!(of("edit_bounds = \"range\"").1, "range");
+    let text = done(&folder, &["info", "scene.toml"]);
+    assert!(text.contains("march exact; edit bounds range"), "{text}");
+}
+
+#[test]
+fn the_command_line_wins_over_the_scenes_march() {
+    let folder = Folder::with_quad();
+    let noise = |i: u32| (i.wrapping_mul(0x9e37_79b9) >> 16) as u16;
+    let heights: Vec<u16> = (0..64 * 64).map(noise).collect();
+    write_png_gray16(&folder.path("flat.png"), 64, 64, &heights).unwrap();
+    let _ = march_of(&folder, "dt = 1000000");
+    let picture = |options: &[&str]| {
+        let mut args = vec!["render", "scene.toml", "-o", "a.exr", "--quiet"];
+        args.extend(options);
+        done(&folder, &args);
+        std::fs::read(folder.path("a.exr")).unwrap()
+    };
+    // Steps that long see nothing of the surface but where they start.
+    let steps = picture(&[]);
+    let exact = picture(&["--march", "exact"]);
+    assert_ne!(steps, exact);
+    assert_eq!(picture(&["--march", "uniform"]), steps);
+    assert_ne!(picture(&["--dt", "0.25"]), steps);
+}
+
 #[test]
 fn info_counts_triangles_and_bytes() {
     let folder = Folder::with_quad();
@@ -261,15 +314,16 @@ fn info_counts_triangles_and_bytes() {
     // Finest blocks of 4x4 texels, then one of 8x8; pairs of 16 bits.
     assert!(bytes(&map["pyramid_bytes"]) >= 4 * (4 + 1));
     let memory = &info["memory"];
-    // 108 bytes per base triangle, as in the paper; in groups of eight.
-    assert_eq!(bytes(&memory["overhead"]["prisms"]), 8 * 108);
+    // Prisms go in groups of eight, 108 bytes each.
+    const PRISMS: u64 = 8 * 108;
+    assert_eq!(bytes(&memory["overhead"]["prisms"]), PRISMS);
     let common = &memory["common"];
     let common = bytes(&common["maps"]) + bytes(&common["meshes"]) + bytes(&common["bvh"]);
     let pyramids = bytes(&memory["overhead"]["pyramids"]);
     assert_eq!(pyramids, bytes(&map["pyramid_bytes"]));
-    assert_eq!(bytes(&memory["total"]), common + 8 * 108 + pyramids);
+    assert_eq!(bytes(&memory["total"]), common + PRISMS + pyramids);
     let text = done(&folder, &["info", "scene.toml"]);
-    for word in ["floor", "8x8", "16-bit", "overhead", "216 B"] {
+    for word in ["floor", "8x8", "16-bit", "overhead", "864 B"] {
         assert!(text.contains(word), "no {word} in {text}");
     }
 }
@@ -312,7 +366,7 @@ fn a_render_writes_a_picture_and_its_statistics() {
         }
         assert!(stats["mrays_per_second"].as_f64().unwrap() > 0.0);
         assert!(stats["backend"].as_str().unwrap().len() > 3 && stats["simd"].is_string());
-        assert_eq!(stats["memory"]["overhead"]["prisms"], 8 * 108);
+        assert_eq!(stats["memory"]["overhead"]["prisms"], 864);
     }
 }
 

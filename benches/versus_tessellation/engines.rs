@@ -18,7 +18,7 @@ pub trait Engine {
     /// What can be traced.
     fn scene(&self) -> &Scene;
 
-    /// Takes over a surface that differs in the texels of `rect`.
+    /// Follows an edit of the surface's map in the texels of `rect`.
     fn edit(&mut self, surface: &Surface, rect: Rect);
 
     /// Bytes that tracing needs, beside what Embree allocates.
@@ -105,11 +105,10 @@ impl Engine for PrismEngine {
         self.scene.as_ref().expect(COMMITTED)
     }
 
-    fn edit(&mut self, surface: &Surface, _: Rect) {
-        self.prisms = prisms_of(surface);
-        change(&mut self.scene, |builder| {
-            builder.replace(0, self.prisms.clone())
-        });
+    fn edit(&mut self, _: &Surface, rect: Rect) {
+        if self.prisms.map_edited(rect.texels()).any() {
+            change(&mut self.scene, |builder| builder.changed(0));
+        }
     }
 
     fn bytes(&self) -> usize {

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 use prismarch::embree::Grid;
-use prismarch::surface::DisplacedSurface;
+use prismarch::surface::{DisplacedSurface, TexelRect};
 use rayon::prelude::*;
 
 /// Texels that were edited.
@@ -12,6 +12,19 @@ pub struct Rect {
     pub start: (usize, usize),
     /// Along both sides.
     pub side: usize,
+}
+
+impl Rect {
+    /// As the map has it.
+    pub fn texels(self) -> TexelRect {
+        let (x, y) = self.start;
+        TexelRect {
+            x,
+            y,
+            width: self.side,
+            height: self.side,
+        }
+    }
 }
 
 /// How base triangles are cut: all into the same number of pieces, so that neighbours have the same vertices on their

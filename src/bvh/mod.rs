@@ -14,12 +14,14 @@ mod tree;
 mod triangle;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use glam::{Affine3A, Mat3A, Vec3};
 use thiserror::Error;
 
 use crate::ray::{Aabb, Ray};
-use crate::trace::{Hit, INVALID_ID, Placement, Tracer, World};
+use crate::surface::{DisplacementMap, TexelRect};
+use crate::trace::{Edited, Hit, INVALID_ID, Placement, Tracer, World, grown};
 use object::{Closest, ObjectTree, boxes, within_reach};
 use tree::Tree;
 
@@ -98,6 +100,8 @@ pub struct BvhTracer {
     /// In the order of top-level ids.
     places: Vec<Place>,
     top: Tree,
+    /// [`World::growths`] when the boxes were taken.
+    growths: Vec<u64>,
 }
 
 impl BvhTracer {
@@ -107,6 +111,7 @@ impl BvhTracer {
     ///
     /// [`BvhError`] for boxes and transforms that cannot be traced.
     pub fn new(world: &World) -> Result<Self, BvhError> {
+        let growths = world.growths();
         let objects = world
             .objects()
             .iter()
@@ -119,6 +124,7 @@ impl BvhTracer {
             objects,
             places,
             top: Tree::build(&boxes, 1)?,
+            growths,
         })
     }
 
@@ -131,6 +137,7 @@ impl BvhTracer {
     /// nothing has changed.
     pub fn refit(&mut self, world: &World) -> Result<(), BvhError> {
         self.check_same_layout(world)?;
+        let growths = world.growths();
         let object_boxes = world
             .objects()
             .iter()
@@ -149,7 +156,46 @@ impl BvhTracer {
         }
         self.places = places;
         self.top.refit(&place_boxes);
+        self.growths = growths;
         Ok(())
+    }
+
+    /// Brings the tracer up to date after an edit of a map in place ([`DisplacementMap::update`]): `world` is the one it was
+    /// built from, and all its objects over `map` follow. Trees are refitted only where bounds have grown, also by edits that
+    /// another tracer of the same prisms has been told of.
+    ///
+    /// # Errors
+    ///
+    /// As [`refit`](Self::refit); then the trees are as they were, and may miss what has grown.
+    pub fn map_edited(
+        &mut self,
+        world: &World,
+        map: &Arc<DisplacementMap>,
+        rect: TexelRect,
+    ) -> Result<Edited, BvhError> {
+        self.check_same_layout(world)?;
+        let prims_touched = world.map_edited(map, rect);
+        let growths = world.growths();
+        let grown = grown(&self.growths, &growths);
+        if !grown.is_empty() {
+            let boxes_of = |&index: &usize| boxes(&world.objects()[index].shape, index);
+            let new = grown.iter().map(boxes_of).collect::<Result<Vec<_>, _>>()?;
+            let mut bounds: Vec<Aabb> = self.objects.iter().map(ObjectTree::bounds).collect();
+            for (&index, boxes) in grown.iter().zip(&new) {
+                bounds[index] = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
+            }
+            let (places, place_boxes) = places(world, &bounds)?;
+            for (&index, boxes) in grown.iter().zip(&new) {
+                self.objects[index].refit(&world.objects()[index].shape, boxes);
+            }
+            self.places = places;
+            self.top.refit(&place_boxes);
+            self.growths = growths;
+        }
+        Ok(Edited {
+            prims_touched,
+            committed: !grown.is_empty(),
+        })
     }
 
     fn check_same_layout(&self, world: &World) -> Result<(), BvhError> {

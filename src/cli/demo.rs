@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::engine::EngineArgs;
 use super::error::CliError;
+use super::march::MarchArgs;
 use super::picture::Target;
 use super::render::{FilmArgs, Job};
 use crate::demo::{DEMOS, Demo};
@@ -66,6 +67,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         target: Target::new(&scene.with_extension("png"))?,
         scene: &scene,
         film: &args.film,
+        march: &MarchArgs::default(),
         stats: None,
         engine: &args.engine,
         quiet: args.quiet,

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::engine::EngineArgs;
 use super::error::CliError;
 use super::memory::Memory;
+use crate::prism::{March, PrismOptions, Step};
 use crate::scene::{Loaded, MapFile, ObjectShape};
 
 /// Tell what a scene is made of and what memory it takes
@@ -75,6 +76,9 @@ struct Object {
     displaced: bool,
     /// That close its seams; 0 where they are open.
     walls: usize,
+    /// How its prisms are made, if it is displaced.
+    march: Option<String>,
+    edit_bounds: Option<&'static str>,
     /// 1 for an object that stands where it is.
     instances: usize,
     material: String,
@@ -115,10 +119,32 @@ fn objects(loaded: &Loaded) -> Vec<Object> {
             ObjectShape::Displaced(surface, _) => surface.walls().len(),
             ObjectShape::Plain(_) => 0,
         },
+        march: options(&object.shape).map(|options| march(options.march)),
+        edit_bounds: options(&object.shape).map(|options| options.edit_bounds.name()),
         instances: object.instances.len().max(1),
         material: scene.materials[object.material].name.clone(),
     };
     scene.objects.iter().map(object).collect()
+}
+
+fn options(shape: &ObjectShape) -> Option<PrismOptions> {
+    match shape {
+        ObjectShape::Displaced(_, options) => Some(*options),
+        ObjectShape::Plain(_) => None,
+    }
+}
+
+/// `exact`, `uniform, dt 1 texels` or `uniform, dt 0.01 world units, jitter`.
+fn march(march: March) -> String {
+    let March::Uniform { step, jitter } = march else {
+        return "exact".to_owned();
+    };
+    let (size, unit) = match step {
+        Step::Texels(size) => (size, "texels"),
+        Step::World(size) => (size, "world units"),
+    };
+    let jitter = if jitter { ", jitter" } else { "" };
+    format!("uniform, dt {size} {unit}{jitter}")
 }
 
 fn triangles(shape: &ObjectShape) -> usize {
@@ -149,10 +175,12 @@ impl fmt::Display for Info {
                 instances,
                 ..
             } = object;
-            let displaced = if object.displaced { "  displaced" } else { "" };
-            write!(f, "  {name:32} {triangles:>11} {instances:>9}{displaced}")?;
+            write!(f, "  {name:32} {triangles:>11} {instances:>9}")?;
+            if let (Some(march), Some(bounds)) = (&object.march, object.edit_bounds) {
+                write!(f, "  displaced: march {march}; edit bounds {bounds}")?;
+            }
             if object.walls > 0 {
-                write!(f, ", seams closed by {} walls", object.walls)?;
+                write!(f, "; seams closed by {} walls", object.walls)?;
             }
             writeln!(f)?;
         }

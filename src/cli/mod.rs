@@ -8,6 +8,7 @@ mod engine;
 mod error;
 mod hits;
 mod info;
+mod march;
 mod memory;
 mod parse;
 mod picture;

@@ -10,10 +10,11 @@ use rayon::prelude::*;
 use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
 use super::hits;
+use super::march::MarchArgs;
 use super::parse;
 use super::rays::{Layout, RayError, RayReader, Row};
 use crate::image::{Channel, atomic};
-use crate::prism::{March, Step};
+use crate::prism::PrismOptions;
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
 use crate::surface::{DisplacedSurface, Displacement, Projection, Seams, UvTransform, Wrap};
 use crate::trace::World;
@@ -36,16 +37,8 @@ pub struct Args {
     scene: Option<PathBuf>,
     #[command(flatten)]
     surface: SurfaceArgs,
-    /// How the surface is looked for inside a prism [default: the scene's, or exact; uniform with --dt, --dt-world or
-    /// --jitter]
-    #[arg(long, value_enum)]
-    march: Option<MarchKind>,
-    /// Step of the uniform march in texels of the map [default: the scene's, or 1]
-    #[arg(long, value_name = "TEXELS", value_parser = parse::texels)]
-    dt: Option<f32>,
-    /// Step of the uniform march in world units
-    #[arg(long, value_name = "LENGTH", value_parser = parse::length, conflicts_with = "dt")]
-    dt_world: Option<f32>,
+    #[command(flatten)]
+    march: MarchArgs,
     /// Shift the steps of each ray at random (thin-feature sampling)
     #[arg(long, value_name = "SEED")]
     jitter: Option<u32>,
@@ -86,14 +79,6 @@ struct SurfaceArgs {
     /// The map outside of [0, 1]
     #[arg(long, value_enum, default_value_t = WrapKind::Repeat, requires = "mesh")]
     wrap: WrapKind,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum MarchKind {
-    /// The first crossing, whatever the map: no step
-    Exact,
-    /// Equal steps along the ray, as in the paper
-    Uniform,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -167,7 +152,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut rays = RayReader::open(&args.rays)?;
     let mut loaded = args.load()?;
     super::warn(&loaded.warnings);
-    args.override_march(&mut loaded.scene)?;
+    args.march.apply(&mut loaded.scene, args.jitter.is_some())?;
     args.override_seams(&mut loaded.scene);
     let world = loaded.scene.world()?;
     let engine = args.engine.build(&world)?;
@@ -219,7 +204,7 @@ impl Args {
                         midlevel: self.surface.midlevel,
                         uv: UvTransform::default(),
                     },
-                    march: March::default(),
+                    prisms: PrismOptions::default(),
                 })?)
             }
             _ => Err(CliError::Usage(
@@ -237,46 +222,6 @@ impl Args {
                 *surface = Arc::new(other);
             }
         }
-    }
-
-    /// What the command line says of the march wins over the scene.
-    fn override_march(&self, scene: &mut Scene) -> Result<(), CliError> {
-        let step_here = match (self.dt, self.dt_world) {
-            (Some(texels), _) => Some(Step::Texels(texels)),
-            (None, Some(length)) => Some(Step::World(length)),
-            (None, None) => None,
-        };
-        let has_steps = step_here.is_some() || self.jitter.is_some();
-        let kind = match (self.march, has_steps) {
-            (Some(MarchKind::Exact), true) => {
-                return Err(CliError::Usage(
-                    "--dt, --dt-world and --jitter belong to the uniform march; the exact one has no step"
-                        .into(),
-                ));
-            }
-            (None, true) => Some(MarchKind::Uniform),
-            (kind, _) => kind,
-        };
-        for object in &mut scene.objects {
-            let ObjectShape::Displaced(_, march) = &mut object.shape else {
-                continue;
-            };
-            let (step, jitter) = match *march {
-                March::Uniform { step, jitter } => (step, jitter),
-                March::Exact => (Step::Texels(1.0), false),
-            };
-            match kind {
-                None => {}
-                Some(MarchKind::Exact) => *march = March::Exact,
-                Some(MarchKind::Uniform) => {
-                    *march = March::Uniform {
-                        step: step_here.unwrap_or(step),
-                        jitter: jitter || self.jitter.is_some(),
-                    };
-                }
-            }
-        }
-        Ok(())
     }
 }
 

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
+use super::march::MarchArgs;
 use super::memory::Memory;
 use super::parse::{self, Size};
 use super::picture::Target;
@@ -26,6 +27,7 @@ use crate::trace::World;
 Examples:
   prismarch render scene.toml
   prismarch render scene.toml -o rock.exr --size 1920x1080 --spp 256
+  prismarch render scene.toml --march uniform --dt 0.5
   prismarch render scene.toml --backend bvh --threads 4 --stats stats.json --quiet")]
 pub struct Args {
     /// Scene file (TOML)
@@ -35,6 +37,8 @@ pub struct Args {
     output: Option<PathBuf>,
     #[command(flatten)]
     film: FilmArgs,
+    #[command(flatten)]
+    march: MarchArgs,
     /// Write times, ray counts and memory as JSON
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
@@ -67,6 +71,8 @@ pub struct Job<'a> {
     pub target: Target,
     /// Film settings that win over the scene's.
     pub film: &'a FilmArgs,
+    /// Marches that win over the scene's.
+    pub march: &'a MarchArgs,
     /// Where the statistics go.
     pub stats: Option<&'a Path>,
     /// Backend and threads; the threads are started.
@@ -92,6 +98,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         scene: &args.scene,
         target,
         film: &args.film,
+        march: &args.march,
         stats: args.stats.as_deref(),
         engine: &args.engine,
         quiet: args.quiet,
@@ -106,6 +113,7 @@ impl Job<'_> {
         let mut loaded = Loaded::from_file(self.scene)?;
         super::warn(&loaded.warnings);
         self.film.apply(&mut loaded.scene.film);
+        self.march.apply(&mut loaded.scene, false)?;
         let load = clock.lap();
         let world = loaded.scene.world()?;
         let engine = self.engine.build(&world)?;

@@ -304,6 +304,15 @@ impl Scene {
         self.0
     }
 
+    /// Changes the scene where it is and commits it. After an error it must not be traced.
+    pub(super) fn change(
+        &mut self,
+        change: impl FnOnce(&mut SceneBuilder) -> Result<(), EmbreeError>,
+    ) -> Result<(), EmbreeError> {
+        change(&mut self.0)?;
+        self.0.commit_in_place()
+    }
+
     /// The device.
     pub fn device(&self) -> &Device {
         &self.0.device

@@ -23,7 +23,8 @@ pub struct Cluster {
     texcoords: [[[f32; LANES]; 2]; 3],
     /// Bits of the smallest and the largest w: an edit of the map changes them in place.
     offsets: [[AtomicU32; LANES]; 2],
-    prims: [u32; LANES],
+    /// Base triangles, with flags: an edit may set [`FOLDED`].
+    prims: [AtomicU32; LANES],
 }
 
 const _: () = assert!(size_of::<Cluster>() == 108 * LANES);
@@ -64,7 +65,7 @@ impl Cluster {
             normals: [[[0.0; LANES]; 3]; 3],
             texcoords: [[[0.0; LANES]; 2]; 3],
             offsets: Default::default(),
-            prims: std::array::from_fn(of_lane),
+            prims: std::array::from_fn(|l| AtomicU32::new(of_lane(l))),
         };
         for l in 0..LANES {
             let prim = of_lane(l);
@@ -85,29 +86,77 @@ impl Cluster {
             }
             let patch = surface.patch(prim);
             if is_folded(&patch, range.map(f64::from)) {
-                cluster.prims[l] |= FOLDED;
+                *cluster.prims[l].get_mut() |= FOLDED;
             }
             let [a, b, c] = patch.texels;
             if (b - a).abs().max((c - a).abs()).max_element() > LONG_TEXELS {
-                cluster.prims[l] |= LONG;
+                *cluster.prims[l].get_mut() |= LONG;
             }
             for wall in surface.walls_of(prim) {
-                cluster.prims[l] |= 1 << (WALLS + u32::from(wall.side));
+                *cluster.prims[l].get_mut() |= 1 << (WALLS + u32::from(wall.side));
             }
         }
         cluster
     }
 
+    /// A lane's base triangle with its flags.
+    #[inline(always)]
+    fn flagged(&self, lane: usize) -> u32 {
+        self.prims[lane].load(Ordering::Relaxed)
+    }
+
+    /// Makes room for this range of w on a lane whose prism is over `patch`.
+    pub fn widen(&self, lane: usize, patch: &Patch<'_>, offsets: [f32; 2]) {
+        let [low, high] = self.offsets(lane);
+        let both = [low.min(offsets[0]), high.max(offsets[1])];
+        // First of all, so that no ray goes by the wider range in the wrong order for longer than it must.
+        if self.is_ordered(lane) && is_folded(patch, both.map(f64::from)) {
+            self.prims[lane].fetch_or(FOLDED, Ordering::Relaxed);
+        }
+        super::edits::widen([&self.offsets[0][lane], &self.offsets[1][lane]], offsets);
+    }
+
+    /// The box around the texture coordinates of all lanes: [low, high] across and up. `None` if one is no finite number.
+    pub fn texcoord_bounds(&self) -> Option<[[f32; 2]; 2]> {
+        // NaN where a coordinate is no finite number. By lanes: a sum of one lane would wait for itself.
+        let mut zero = [0.0; LANES];
+        let bounds = [0, 1].map(|axis| {
+            let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+            for corner in &self.texcoords {
+                for (l, &s) in corner[axis].iter().enumerate() {
+                    low[l] = if s < low[l] { s } else { low[l] };
+                    high[l] = if s > high[l] { s } else { high[l] };
+                    zero[l] += 0.0 * s;
+                }
+            }
+            let least = |a: f32, b: f32| if b < a { b } else { a };
+            let most = |a: f32, b: f32| if b > a { b } else { a };
+            [
+                low.into_iter().fold(f32::INFINITY, least),
+                high.into_iter().fold(f32::NEG_INFINITY, most),
+            ]
+        });
+        (zero == [0.0; LANES]).then_some(bounds)
+    }
+
+    /// The same for one lane.
+    pub fn lane_texcoord_bounds(&self, lane: usize) -> [[f32; 2]; 2] {
+        [0, 1].map(|axis| {
+            let [a, b, c] = [0, 1, 2].map(|k: usize| self.texcoords[k][axis][lane]);
+            [a.min(b).min(c), a.max(b).max(c)]
+        })
+    }
+
     /// Base triangle of a lane.
     #[inline(always)]
     pub fn prim(&self, lane: usize) -> u32 {
-        self.prims[lane] & (MOST_PRISMS as u32 - 1)
+        self.flagged(lane) & (MOST_PRISMS as u32 - 1)
     }
 
     /// The sides of a lane with walls: bit k for side k.
     #[inline(always)]
     pub fn walls(&self, lane: usize) -> u32 {
-        self.prims[lane] >> WALLS & 0b111
+        self.flagged(lane) >> WALLS & 0b111
     }
 
     /// The range of w of a lane.
@@ -137,13 +186,13 @@ impl Cluster {
     /// Whether t is monotone in w on all rays through a lane's prism.
     #[inline(always)]
     pub fn is_ordered(&self, lane: usize) -> bool {
-        self.prims[lane] & FOLDED == 0
+        self.flagged(lane) & FOLDED == 0
     }
 
     /// Whether f32 tells the texels along any ray through a lane's prism apart.
     #[inline(always)]
     pub fn is_short(&self, lane: usize) -> bool {
-        self.prims[lane] & LONG == 0
+        self.flagged(lane) & LONG == 0
     }
 
     /// One prism's corners in the order of `axes`.
@@ -168,9 +217,8 @@ impl Cluster {
     #[inline(always)]
     pub fn texels(&self, lane: usize, map: &DisplacementMap) -> [DVec2; 3] {
         let [s0, s1, s2] = &self.texcoords;
-        let texel = |s: &[[f32; LANES]; 2]| {
-            map.to_texel(DVec2::new(s[0][lane].into(), s[1][lane].into()))
-        };
+        let texel =
+            |s: &[[f32; LANES]; 2]| map.to_texel(DVec2::new(s[0][lane].into(), s[1][lane].into()));
         [texel(s0), texel(s1), texel(s2)]
     }
 
@@ -266,7 +314,13 @@ mod tests {
     fn groups_are_full_compact_and_hold_every_triangle_once() {
         for count in [1, 7, 8, 9, 16, 17, 100, 1280] {
             let centroids: Vec<DVec3> = (0..count)
-                .map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100)))
+                .map(|i| {
+                    DVec3::new(
+                        f64::from(i % 10),
+                        f64::from(i / 10 % 10),
+                        f64::from(i / 100),
+                    )
+                })
                 .collect();
             let order = groups(&centroids);
             let mut sorted = order.clone();

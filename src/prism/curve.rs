@@ -321,8 +321,8 @@ impl<Q: Quad> View<Q> {
         for pair in cuts[..count + 1].windows(2) {
             let [(from, start), (to, end)] = [pair[0], pair[1]];
             let s = 0.5 * (from + to);
-            let inside = (0..3)
-                .all(|k| constant >> k & 1 != 0 || c0[k] + s * (c1[k] + s * c2[k]) >= 0.0);
+            let inside =
+                (0..3).all(|k| constant >> k & 1 != 0 || c0[k] + s * (c1[k] + s * c2[k]) >= 0.0);
             if !inside {
                 if let Some(done) = stretch.take() {
                     found.push(done);

@@ -2,6 +2,7 @@
 
 use super::cluster::{Cluster, MOST_PRISMS, groups};
 use super::cull::Pairs;
+use super::edits::EditBounds;
 use super::march::exact::{Found, Problem, root, search, walls};
 use super::ray_frame::{RayFrame, RayLanes, axes};
 use super::simd::{LANES, Lanes};
@@ -17,7 +18,7 @@ pub struct ExactPrisms {
 }
 
 impl ExactPrisms {
-    pub fn new(surface: &DisplacedSurface) -> Result<Self, MarchError> {
+    pub fn new(surface: &DisplacedSurface, bounds: EditBounds) -> Result<Self, MarchError> {
         let prims = surface.mesh().triangles().len();
         if prims > MOST_PRISMS {
             return Err(MarchError::TooManyTriangles {
@@ -31,7 +32,7 @@ impl ExactPrisms {
                 a + b + c
             })
             .collect();
-        let offsets = |prim| surface.offsets(prim);
+        let offsets = |prim| bounds.offsets(surface, prim);
         Ok(Self {
             clusters: groups(&centroids)
                 .chunks(LANES)

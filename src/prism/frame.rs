@@ -7,32 +7,34 @@
 //! with n_i . Ng <= 0 too. v0 comes from the mesh, so that a ray is moved near the triangle before anything is
 //! multiplied (f32 keeps its digits far from the origin); the three floats saved hold the range of the surface.
 
-use bytemuck::{Pod, Zeroable};
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use glam::{DMat3, DVec3, Vec2, Vec3, Vec4};
 
 use crate::surface::Patch;
 
 /// One prism.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub struct Prism([f32; 27]);
+pub struct Prism {
+    numbers: [f32; 25],
+    /// Bits of the smallest and the largest D: an edit of the map changes them in place.
+    range: [AtomicU32; 2],
+}
 
 const _: () = assert!(size_of::<Prism>() == 108);
 
 const NORMALS: usize = 9;
 const TEXELS: usize = 18;
-const RANGE: usize = 24;
-const STRETCH: usize = 26;
+const STRETCH: usize = 24;
 
 impl Prism {
-    /// The prism over a patch.
-    pub fn new(patch: &Patch<'_>) -> Self {
+    /// The prism over a patch, for this range of D.
+    pub fn new(patch: &Patch<'_>, range: [f64; 2]) -> Self {
         let [v0, v1, v2] = patch.vertices;
         let to_world = DMat3::from_cols(v1 - v0, v2 - v0, patch.face_normal());
         let to_frame = to_world.inverse();
-        let mut record = [0.0; 27];
+        let mut numbers = [0.0; 25];
         let mut put =
-            |at: usize, v: DVec3| record[at..at + 3].copy_from_slice(&v.as_vec3().to_array());
+            |at: usize, v: DVec3| numbers[at..at + 3].copy_from_slice(&v.as_vec3().to_array());
         put(0, to_frame.x_axis);
         put(3, to_frame.y_axis);
         put(6, to_frame.z_axis);
@@ -40,15 +42,23 @@ impl Prism {
             put(NORMALS + 3 * i, to_frame * n);
         }
         for (i, st) in patch.texels.iter().enumerate() {
-            record[TEXELS + 2 * i..][..2].copy_from_slice(&st.as_vec2().to_array());
+            numbers[TEXELS + 2 * i..][..2].copy_from_slice(&st.as_vec2().to_array());
         }
-        // Outward by a rounding.
-        let [low, high] = patch.range();
-        let slack = 1e-6 * low.abs().max(high.abs());
-        record[RANGE] = (low - slack) as f32;
-        record[RANGE + 1] = (high + slack) as f32;
-        record[STRETCH] = (1.000_001 / patch.shortest_normal()) as f32;
-        Self(record)
+        numbers[STRETCH] = (1.000_001 / patch.shortest_normal()) as f32;
+        Self {
+            numbers,
+            range: outward(range).map(|d| AtomicU32::new(d.to_bits())),
+        }
+    }
+
+    /// Whether there is room for this range of D.
+    pub fn holds(&self, range: [f64; 2]) -> bool {
+        super::edits::holds(self.range(), outward(range))
+    }
+
+    /// Makes room for this range of D; whether there was none.
+    pub fn widen(&self, range: [f64; 2]) -> bool {
+        super::edits::widen([&self.range[0], &self.range[1]], outward(range))
     }
 
     /// A vector in the frame: (b, c, h, b + c).
@@ -60,13 +70,14 @@ impl Prism {
     /// Smallest and largest D.
     #[inline(always)]
     pub fn range(&self) -> [f32; 2] {
-        [self.0[RANGE], self.0[RANGE + 1]]
+        let [low, high] = &self.range;
+        [low, high].map(|d| f32::from_bits(d.load(Ordering::Relaxed)))
     }
 
     /// The range of w = D / |N'|.
     #[inline(always)]
     pub fn offsets(&self) -> [f32; 2] {
-        let ([low, high], stretch) = (self.range(), self.0[STRETCH]);
+        let ([low, high], stretch) = (self.range(), self.numbers[STRETCH]);
         [low.min(low * stretch), high.max(high * stretch)]
     }
 
@@ -79,22 +90,31 @@ impl Prism {
     /// Texel coordinates of vertex i.
     #[inline(always)]
     pub fn texel(&self, i: usize) -> Vec2 {
-        Vec2::new(self.0[TEXELS + 2 * i], self.0[TEXELS + 2 * i + 1])
+        Vec2::new(
+            self.numbers[TEXELS + 2 * i],
+            self.numbers[TEXELS + 2 * i + 1],
+        )
     }
 
     /// The smallest n_i . Ng.
     #[inline(always)]
     pub fn lowest_normal_height(&self) -> f32 {
-        self.0[NORMALS + 2]
-            .min(self.0[NORMALS + 5])
-            .min(self.0[NORMALS + 8])
+        self.numbers[NORMALS + 2]
+            .min(self.numbers[NORMALS + 5])
+            .min(self.numbers[NORMALS + 8])
     }
 
     /// Three floats as lanes; the fourth lane is whatever follows.
     #[inline(always)]
     fn column(&self, at: usize) -> Vec4 {
-        Vec4::from_slice(&self.0[at..at + 4])
+        Vec4::from_slice(&self.numbers[at..at + 4])
     }
+}
+
+/// A range, outward by a rounding.
+fn outward([low, high]: [f64; 2]) -> [f32; 2] {
+    let slack = 1e-6 * low.abs().max(high.abs());
+    [(low - slack) as f32, (high + slack) as f32]
 }
 
 /// (b, c, h, b + c).
@@ -130,7 +150,7 @@ mod tests {
             scale: 1.0,
             midlevel: 0.0,
         };
-        let prism = Prism::new(&patch);
+        let prism = Prism::new(&patch, patch.range());
         let near = |a: Vec4, b: Vec4| assert!((a - b).abs().max_element() < 1e-5, "{a} {b}");
         let lift = 0.5 * patch.face_normal();
         let point = |p: DVec3| prism.vector((p - vertices[0]).as_vec3());

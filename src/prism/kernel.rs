@@ -59,7 +59,11 @@ macro_rules! stamps {
 impl Kernel {
     /// The kernel of `level`, or of the baseline where the machine lacks it.
     pub fn new(march: March, level: SimdLevel) -> Self {
-        let level = if level.is_supported() { level } else { SimdLevel::Baseline };
+        let level = if level.is_supported() {
+            level
+        } else {
+            SimdLevel::Baseline
+        };
         let (intersect, occluded) = match march {
             March::Exact => stamps!(exact, level),
             March::Uniform { .. } => stamps!(uniform, level),

@@ -10,6 +10,7 @@
 mod cluster;
 mod cull;
 mod curve;
+mod edits;
 mod exact;
 mod frame;
 #[allow(unsafe_code)] // SIMD stamps
@@ -24,9 +25,11 @@ mod sides;
 mod simd;
 #[cfg(test)]
 mod tests;
+mod touch;
 mod uniform;
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 use glam::{DVec3, Vec3};
 
@@ -36,6 +39,7 @@ use exact::ExactPrisms;
 use kernel::Kernel;
 use uniform::UniformPrisms;
 
+pub use edits::{BoundsChange, EditBounds};
 pub use march::{March, MarchError, Step};
 pub use simd::SimdLevel;
 
@@ -68,6 +72,30 @@ pub struct Prisms {
     parts: Parts,
     march: March,
     kernel: Kernel,
+    edit_bounds: EditBounds,
+    /// Heights for which every prism has room.
+    room: Option<(f32, f32)>,
+    /// Edits so far that made bounds grow.
+    growths: AtomicU64,
+}
+
+/// How prisms are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PrismOptions {
+    /// How the surface is looked for.
+    pub march: March,
+    /// How much room they have for edits of the map.
+    pub edit_bounds: EditBounds,
+}
+
+impl From<March> for PrismOptions {
+    /// With [tight](EditBounds::Tight) bounds.
+    fn from(march: March) -> Self {
+        Self {
+            march,
+            edit_bounds: EditBounds::default(),
+        }
+    }
 }
 
 /// What a march reads beside mesh and map.
@@ -77,26 +105,34 @@ enum Parts {
 }
 
 impl Prisms {
-    /// Builds the prisms; the kernel is chosen once, for this machine.
+    /// Builds the prisms; a [`March`] alone will do for the options. The kernel is chosen once, for this machine.
     ///
     /// # Errors
     ///
     /// A step that is no positive number; closed [`Seams`] with the uniform march; more base triangles than the exact
-    /// march can number (2^28).
-    pub fn new(surface: Arc<DisplacedSurface>, march: March) -> Result<Self, MarchError> {
+    /// march can number (2^27).
+    pub fn new(
+        surface: Arc<DisplacedSurface>,
+        options: impl Into<PrismOptions>,
+    ) -> Result<Self, MarchError> {
+        let PrismOptions { march, edit_bounds } = options.into();
         let march = march.validate()?;
+        let room = edit_bounds.room(surface.map());
         let parts = match march {
-            March::Exact => Parts::Exact(ExactPrisms::new(&surface)?),
+            March::Exact => Parts::Exact(ExactPrisms::new(&surface, edit_bounds)?),
             March::Uniform { .. } if surface.seams() == Seams::Closed => {
                 return Err(MarchError::SeamsNeedExact);
             }
-            March::Uniform { .. } => Parts::Uniform(UniformPrisms::new(&surface)),
+            March::Uniform { .. } => Parts::Uniform(UniformPrisms::new(&surface, edit_bounds)),
         };
         Ok(Self {
             surface,
             parts,
             march,
             kernel: Kernel::new(march, SimdLevel::detect()),
+            edit_bounds,
+            room,
+            growths: AtomicU64::new(0),
         })
     }
 
@@ -119,6 +155,11 @@ impl Prisms {
     /// How the surface is looked for.
     pub fn march(&self) -> March {
         self.march
+    }
+
+    /// How much room there is for edits of the map.
+    pub fn edit_bounds(&self) -> EditBounds {
+        self.edit_bounds
     }
 
     /// Number of primitives that a backend traces. A hit names its base triangle.

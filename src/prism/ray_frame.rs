@@ -95,8 +95,7 @@ impl<L: Lanes> RayLanes<L> {
         let per_depth = L::splat(1.0) / z;
         // All of space where ray parameters would overflow.
         let length = z.abs();
-        let usual = (L::splat(LONGEST) - length)
-            .min(length - L::splat(1.0 / LONGEST));
+        let usual = (L::splat(LONGEST) - length).min(length - L::splat(1.0 / LONGEST));
         Self {
             origin: [x, y, z],
             shear: [x * per_depth, y * per_depth],

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::edits::EditBounds;
 use super::frame::Prism;
 use super::march::polish::{Root, polish};
 use super::march::uniform::{Field, Stepping};
@@ -23,12 +24,15 @@ pub struct UniformPrisms {
 }
 
 impl UniformPrisms {
-    pub fn new(surface: &DisplacedSurface) -> Self {
+    pub fn new(surface: &DisplacedSurface, bounds: EditBounds) -> Self {
         let count = surface.mesh().triangles().len() as u32;
         let unit = surface.map().unit();
         Self {
             records: (0..count)
-                .map(|prim| Prism::new(&surface.patch(prim)))
+                .map(|prim| {
+                    let patch = surface.patch(prim);
+                    Prism::new(&patch, bounds.range(surface, prim))
+                })
                 .collect(),
             units: HeightUnits {
                 texel_per_world: unit / surface.displacement().scale,

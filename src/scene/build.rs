@@ -20,7 +20,7 @@ use super::file::{
 use super::load::{FileDisplacement, FileMaterial, FileTexture, load_mesh};
 use super::{Camera, Color, Film, Light, Material, ObjectShape, Scene, SceneObject, Texture};
 use crate::image::{Channel, ColorSpace};
-use crate::prism::March;
+use crate::prism::{March, PrismOptions};
 use crate::surface::{
     BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Projection,
     Seams, UvTransform, Wrap,
@@ -62,8 +62,8 @@ pub struct MeshAndMap {
     pub wrap: Wrap,
     /// What heights mean.
     pub displacement: Displacement,
-    /// How it is marched.
-    pub march: March,
+    /// How its prisms are made.
+    pub prisms: PrismOptions,
 }
 
 impl Loaded {
@@ -103,7 +103,7 @@ impl Loaded {
         let material = builder.default_material();
         builder.objects.push(SceneObject {
             name,
-            shape: ObjectShape::Displaced(Arc::new(surface), source.march),
+            shape: ObjectShape::Displaced(Arc::new(surface), source.prisms),
             instances: Vec::new(),
             mask: u32::MAX,
             material,
@@ -182,12 +182,12 @@ impl Builder {
             let shape = match &table.displacement {
                 Some(displacement) => {
                     let seams = displacement.seams.unwrap_or_else(|| {
-                        default_seams(&self.materials[material], displacement.march)
+                        default_seams(&self.materials[material], displacement.prisms.march)
                     });
                     let surface =
                         self.displaced(&table.file, displacement, by_file.as_ref(), &name, mesh)?;
                     let surface = Arc::new(surface.with_seams(seams));
-                    ObjectShape::Displaced(surface, displacement.march)
+                    ObjectShape::Displaced(surface, displacement.prisms)
                 }
                 None => ObjectShape::Plain(mesh),
             };

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Vec3};
 
 use crate::image::{ColorImage, EnvironmentImage};
-use crate::prism::March;
+use crate::prism::PrismOptions;
 use crate::surface::{BaseMesh, DisplacedSurface, UvTransform, Wrap};
 
 pub use build::{Loaded, MapFile, MeshAndMap};
@@ -137,8 +137,8 @@ pub enum Light {
 /// What an object is made of.
 #[derive(Clone, Debug)]
 pub enum ObjectShape {
-    /// A displaced mesh and how it is marched.
-    Displaced(Arc<DisplacedSurface>, March),
+    /// A displaced mesh and how its prisms are made.
+    Displaced(Arc<DisplacedSurface>, PrismOptions),
     /// A plain mesh.
     Plain(Arc<BaseMesh>),
 }

@@ -23,8 +23,8 @@ impl Scene {
 impl SceneObject {
     fn traced(&self) -> Result<Object, MarchError> {
         let shape = match &self.shape {
-            ObjectShape::Displaced(surface, march) => {
-                Shape::Displaced(Arc::new(Prisms::new(surface.clone(), *march)?))
+            ObjectShape::Displaced(surface, options) => {
+                Shape::Displaced(Arc::new(Prisms::new(surface.clone(), *options)?))
             }
             ObjectShape::Plain(mesh) => Shape::Triangles(mesh.clone()),
         };

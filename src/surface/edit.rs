@@ -112,6 +112,24 @@ impl DisplacementMap {
         })
     }
 
+    /// Smallest and largest height in `rect`.
+    ///
+    /// # Errors
+    ///
+    /// [`MapError::EmptyRect`] and [`MapError::RectOutside`].
+    pub fn range_in(&self, rect: TexelRect) -> Result<(f32, f32), MapError> {
+        self.check(rect)?;
+        let row = |j: usize| {
+            let start = j * self.stride() + rect.x;
+            self.texels.range(start..start + rect.width)
+        };
+        let rows = (rect.y..rect.y + rect.height).filter_map(row);
+        let (low, high) = rows
+            .reduce(|(a, b), (low, high)| (a.min(low), b.max(high)))
+            .ok_or(MapError::EmptyRect(rect))?;
+        Ok((low / self.unit(), high / self.unit()))
+    }
+
     fn check(&self, rect: TexelRect) -> Result<(), MapError> {
         if rect.width == 0 || rect.height == 0 {
             return Err(MapError::EmptyRect(rect));

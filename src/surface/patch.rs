@@ -64,18 +64,17 @@ impl Patch<'_> {
 
     /// Smallest and largest D over the triangle, conservative.
     pub fn range(&self) -> [f64; 2] {
-        let (low, high) = self.map.range_over(self.texels);
+        self.displacements(self.map.range_over(self.texels))
+    }
+
+    /// The range of D for a range of heights.
+    pub fn displacements(&self, (low, high): (f32, f32)) -> [f64; 2] {
         let [a, b] = [low, high].map(|h| self.scale * (f64::from(h) - self.midlevel));
         [a.min(b), a.max(b)]
     }
 
-    /// The range of w = D/|N'| over the triangle, conservative, and never empty.
-    pub fn offsets(&self) -> [f32; 2] {
-        self.offsets_over(self.range())
-    }
-
-    /// The range of w for D in this range.
-    pub(super) fn offsets_over(&self, [low, high]: [f64; 2]) -> [f32; 2] {
+    /// The range of w = D/|N'| for a range of D, conservative, and never empty.
+    pub fn offsets_of(&self, [low, high]: [f64; 2]) -> [f32; 2] {
         let [a, b, c] = self.vertices;
         let size = (b - a).abs().max((c - a).abs()).max_element();
         let slack = 1e-6 * (low.abs().max(high.abs()) + size);

@@ -253,21 +253,20 @@ impl DisplacedSurface {
         Some(((first + k) as u32, &walls[k]))
     }
 
-    /// The range of w = D/|N'| over a triangle and its walls, conservative, and never empty.
-    pub fn offsets(&self, triangle: u32) -> [f32; 2] {
+    /// Smallest and largest D over a triangle and its walls, conservative.
+    pub fn displacements(&self, triangle: u32) -> [f64; 2] {
         let patch = self.patch(triangle);
-        let mut range = patch.range();
-        for wall in self.walls_of(triangle) {
-            let [low, high] = match self.other_texels(wall) {
+        let walls = self.walls_of(triangle).iter();
+        walls.fold(patch.range(), |[low, high], wall| {
+            let [a, b] = match self.other_texels(wall) {
                 None => [0.0; 2],
                 Some(texels) => Patch { texels, ..patch }.range(),
             };
-            range = [range[0].min(low), range[1].max(high)];
-        }
-        patch.offsets_over(range)
+            [low.min(a), high.max(b)]
+        })
     }
 
-    /// Whether an edit of `rect` of the map can change the surface over a triangle, its walls, or [`Self::offsets`].
+    /// Whether an edit of `rect` of the map can change the surface over a triangle, its walls, or [`Self::displacements`].
     pub fn overlaps(&self, triangle: u32, rect: TexelRect) -> bool {
         let mut walls = self.walls_of(triangle).iter();
         self.map.overlaps(self.patch(triangle).texels, rect)

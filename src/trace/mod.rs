@@ -1,10 +1,13 @@
 //! The one interface both backends implement, and the world they are built from.
 
+mod edit;
 mod world;
 
 use glam::Vec3;
 
 use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
+pub use edit::Edited;
+pub(crate) use edit::grown;
 pub use world::{Object, Placement, Resolved, Shape, World};
 
 /// Instance levels a hit can hold: one, as Debian's Embree is built.

@@ -174,9 +174,7 @@ impl Lanes for Avx2 {
             let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
             let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
             let (low, high) = match level.entries() {
-                Entries::U8(e) => {
-                    pair::<8>(_mm256_i32gather_epi32::<2>(e.as_ptr().cast(), index))
-                }
+                Entries::U8(e) => pair::<8>(_mm256_i32gather_epi32::<2>(e.as_ptr().cast(), index)),
                 Entries::U16(e) => {
                     pair::<16>(_mm256_i32gather_epi32::<4>(e.as_ptr().cast(), index))
                 }

@@ -221,14 +221,10 @@ impl<'m> Grid<'m> {
         let h11 = flat_x.select_negative(h01, h11);
         let h01 = flat_y.select_negative(h00, h01);
         let h11 = flat_y.select_negative(h10, h11);
-        let ((h00, h10), (h01, h11)) = (
-            swapped(mirrored_x, h00, h10),
-            swapped(mirrored_x, h01, h11),
-        );
-        let ((h00, h01), (h10, h11)) = (
-            swapped(mirrored_y, h00, h01),
-            swapped(mirrored_y, h10, h11),
-        );
+        let ((h00, h10), (h01, h11)) =
+            (swapped(mirrored_x, h00, h10), swapped(mirrored_x, h01, h11));
+        let ((h00, h01), (h10, h11)) =
+            (swapped(mirrored_y, h00, h01), swapped(mirrored_y, h10, h11));
         [h00, h10, h01, h11]
     }
 

@@ -158,7 +158,10 @@ mod tests {
         );
         assert_eq!(y.to_f32(), Vec4::new(4.0, 9.0, 16.0, 25.0));
         assert_eq!(x.abs().to_array(), [1.0, 2.0, 3.0, 0.0]);
-        assert_eq!(x.min(y).max(Q::splat(-1.0)).to_array(), [1.0, -1.0, 3.0, -0.0]);
+        assert_eq!(
+            x.min(y).max(Q::splat(-1.0)).to_array(),
+            [1.0, -1.0, 3.0, -0.0]
+        );
     }
 
     #[test]

@@ -6,7 +6,7 @@ use glam::{Affine3A, EulerRot, Quat, Vec3};
 
 use super::{Item, Keyed, STEP_TEXELS, SceneError, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
-use crate::prism::{March, Step};
+use crate::prism::{EditBounds, March, PrismOptions, Step};
 use crate::surface::{Projection, Seams, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
@@ -53,7 +53,7 @@ pub(in crate::scene) struct DisplacementTable {
     pub midlevel: Option<f32>,
     pub wrap: Option<Wrap>,
     pub uv: Option<UvTransform>,
-    pub march: March,
+    pub prisms: PrismOptions,
     /// Default: what the material needs.
     pub seams: Option<Seams>,
 }
@@ -110,10 +110,22 @@ impl DisplacementTable {
     fn read(item: Item, folder: &Path) -> Result<Self, SceneError> {
         let this = keyed(&item, ());
         let mut section = item.section(&[
-            "map", "channel", "scale", "midlevel", "wrap", "uv", "march", "dt", "dt_world",
-            "jitter", "seams",
+            "map",
+            "channel",
+            "scale",
+            "midlevel",
+            "wrap",
+            "uv",
+            "march",
+            "dt",
+            "dt_world",
+            "jitter",
+            "edit_bounds",
+            "seams",
         ])?;
         let march = march(&mut section)?;
+        let words = [EditBounds::Tight, EditBounds::Range].map(|b| (b.name(), b));
+        let edit_bounds = section.optional("edit_bounds", |i| i.word(&words))?;
         Ok(Self {
             this,
             map: section.optional("map", |i| file_path(&i, folder))?,
@@ -122,34 +134,13 @@ impl DisplacementTable {
             midlevel: section.optional("midlevel", |i| i.number("a height", |_| true))?,
             wrap: section.optional("wrap", wrap)?,
             uv: section.optional("uv", uv_transform)?,
-            march,
+            prisms: PrismOptions {
+                march,
+                edit_bounds: edit_bounds.unwrap_or_default(),
+            },
             seams: seams(&mut section, march)?,
         })
     }
-}
-
-/// The march that is named; else the uniform one where its step or jitter are given, and the exact one otherwise.
-fn march(section: &mut super::Section) -> Result<March, SceneError> {
-    let is_exact = section.optional("march", |i| i.word(&[("exact", true), ("uniform", false)]))?;
-    for key in ["dt", "dt_world", "jitter"] {
-        if is_exact == Some(true)
-            && let Some(item) = section.get(key)
-        {
-            return Err(item.error(
-                "march = \"exact\"",
-                "march = \"uniform\", whose key this is",
-            ));
-        }
-    }
-    let step = step(section)?;
-    let jitter = section.optional("jitter", |i| i.boolean())?;
-    if is_exact.unwrap_or(step.is_none() && jitter.is_none()) {
-        return Ok(March::Exact);
-    }
-    Ok(March::Uniform {
-        step: step.unwrap_or(Step::Texels(1.0)),
-        jitter: jitter.unwrap_or(false),
-    })
 }
 
 fn seams(section: &mut super::Section, march: March) -> Result<Option<Seams>, SceneError> {
@@ -171,6 +162,29 @@ fn channel(item: Item) -> Result<Channel, SceneError> {
     let expected = "\"luminance\", \"r\", \"g\", \"b\", \"a\" or the name of an EXR channel";
     let Ok(channel) = item.text(expected)?.parse();
     Ok(channel)
+}
+
+/// `march`, and what belongs to the uniform one: a step or its jitter choose it where no march is named.
+fn march(section: &mut super::Section) -> Result<March, SceneError> {
+    let words = [("exact", false), ("uniform", true)];
+    let uniform = section.optional("march", |i| i.word(&words))?;
+    if uniform == Some(false) {
+        for key in ["dt", "dt_world", "jitter"] {
+            if let Some(item) = section.get(key) {
+                let found = format!("{key} beside march = \"exact\"");
+                return Err(item.error(found, "march = \"uniform\"; the exact march has no step"));
+            }
+        }
+    }
+    let step = step(section)?;
+    let jitter = section.optional("jitter", |i| i.boolean())?;
+    if uniform != Some(true) && step.is_none() && jitter.is_none() {
+        return Ok(March::Exact);
+    }
+    Ok(March::Uniform {
+        step: step.unwrap_or(Step::Texels(1.0)),
+        jitter: jitter.unwrap_or(false),
+    })
 }
 
 /// `dt` or `dt_world`.

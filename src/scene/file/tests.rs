@@ -3,7 +3,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::*;
-use crate::prism::March;
+use crate::prism::{EditBounds, March, PrismOptions, Step};
 use crate::surface::Wrap;
 
 fn parse(text: &str) -> Result<SceneFile, SceneError> {
@@ -45,7 +45,9 @@ fn the_documented_defaults_are_the_defaults() {
     assert_eq!(mesh.file.value, Path::new("folder/a.obj"));
     assert_eq!((mesh.mask, mesh.instances.len()), (u32::MAX, 0));
     let displacement = mesh.displacement.as_ref().unwrap();
-    assert_eq!((displacement.march, displacement.seams), (March::Exact, None));
+    assert_eq!(displacement.prisms, PrismOptions::default());
+    assert_eq!(displacement.prisms.march, March::Exact);
+    assert_eq!(displacement.seams, None);
     let material = &bare.materials[0];
     assert_eq!(
         (material.metallic, material.roughness, material.specular),
@@ -76,6 +78,35 @@ fn every_value_arrives() {
     };
     assert!((direction.y - 35f32.to_radians().sin()).abs() < 1e-6);
     assert!((direction.length() - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_step_or_its_jitter_choose_the_uniform_march() {
+    let uniform = |step, jitter| March::Uniform { step, jitter };
+    for (keys, march) in [
+        ("", March::Exact),
+        ("march = \"exact\"", March::Exact),
+        ("march = \"uniform\"", uniform(Step::Texels(1.0), false)),
+        ("dt = 0.5", uniform(Step::Texels(0.5), false)),
+        ("dt_world = 0.25", uniform(Step::World(0.25), false)),
+        ("jitter = true", uniform(Step::Texels(1.0), true)),
+        (
+            "march = \"uniform\"\ndt = 2\njitter = true",
+            uniform(Step::Texels(2.0), true),
+        ),
+    ] {
+        for (words, edit_bounds) in [
+            ("", EditBounds::Tight),
+            ("edit_bounds = \"tight\"", EditBounds::Tight),
+            ("edit_bounds = \"range\"", EditBounds::Range),
+        ] {
+            let text =
+                format!("[[mesh]]\nfile = \"a.obj\"\n[mesh.displacement]\n{keys}\n{words}\n");
+            let file = parse(&text).unwrap();
+            let found = file.meshes[0].displacement.as_ref().unwrap().prisms;
+            assert_eq!(found, PrismOptions { march, edit_bounds }, "{keys}");
+        }
+    }
 }
 
 #[test]

@@ -153,14 +153,14 @@ fn neighbours_that_are_wound_the_same_way_still_share_their_edge() {
 }
 
 #[test]
-fn offsets_and_edits_reach_the_other_edge() {
+fn heights_and_edits_reach_the_other_edge() {
     let square = |at: Vec2| quad(UNIT.map(|c| (c.extend(0.0), Vec3::Z, at + 0.1 * c)));
     // Heights rise from 0 at the map's bottom row to 15/255 at its top.
     let (surface, _) = closed(&square(Vec2::new(0.6, 0.8)), Wrap::Clamp, Vec2::ONE);
-    let [low, high] = surface.offsets(0);
+    let [low, high] = surface.displacements(0);
     assert!(low <= 0.0 && high >= 10.0 / 255.0 && high <= 15.1 / 255.0);
     let open = surface.clone().with_seams(Seams::Open);
-    assert!(open.offsets(0)[0] > 8.9 / 255.0);
+    assert!(open.displacements(0)[0] > 8.9 / 255.0);
 
     let mut parted = square(Vec2::new(0.6, 0.8));
     for corner in &mut parted[3..] {

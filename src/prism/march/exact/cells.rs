@@ -62,7 +62,13 @@ impl Chord {
         let (dx, dy, dh) = (x1 - x0, y1 - y0, h1 - h0);
         // Positions relative to the first cell: few digits before the point.
         let (x0, y0) = (x0 - i0, y0 - j0);
-        let inverse = |d: f32| 1.0 / if d.abs() < 1e-12 { 1e-12f32.copysign(d) } else { d };
+        let inverse = |d: f32| {
+            1.0 / if d.abs() < 1e-12 {
+                1e-12f32.copysign(d)
+            } else {
+                d
+            }
+        };
         let (per_x, per_y) = (inverse(dx), inverse(dy));
         let (step_x, step_y) = (1f32.copysign(dx), 1f32.copysign(dy));
         // The line of its cell through which the chord leaves: the right and upper one, or the left and lower one.
@@ -115,9 +121,7 @@ impl Chord {
         let discriminant = (g0 * L::splat(4.0)).neg_mul_add(g2, g1 * g1);
         let crosses = g0.sign_mask() | at_end.sign_mask();
         // The parabola turns between the ends, upward, and has a root.
-        let turns = g1.sign_mask()
-            & !(g1 + g2 + g2).sign_mask()
-            & !discriminant.sign_mask();
+        let turns = g1.sign_mask() & !(g1 + g2 + g2).sign_mask() & !discriminant.sign_mask();
         let used = (1u32 << (nx + ny + 1.0) as u32) - 1;
         let possible = (crosses | turns) & used;
         if possible == 0 {
@@ -202,7 +206,11 @@ impl Chord {
     /// The line through which a lane enters its cell (0) or leaves it (1).
     #[inline(always)]
     fn line(&self, cells: &Cells, lane: usize, axis: usize, end: f32) -> TexelLine {
-        let cell = if axis == 0 { cells.column[lane] } else { cells.row[lane] };
+        let cell = if axis == 0 {
+            cells.column[lane]
+        } else {
+            cells.row[lane]
+        };
         let forward = (self.to[axis] - self.from[axis]).is_sign_positive();
         let offset = if forward { end } else { 1.0 - end };
         TexelLine {

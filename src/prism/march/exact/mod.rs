@@ -151,9 +151,7 @@ fn along<L: Lanes>(
     stretch: &Stretch,
     view: &View<L::Quad>,
 ) -> Option<Found> {
-    let texels = problem
-        .cluster
-        .texels(problem.lane, problem.surface.map());
+    let texels = problem.cluster.texels(problem.lane, problem.surface.map());
     let curve = Curve::new(view, &texels, stretch, frame);
     let ends = curve.ends();
     if problem.is_ordered()

@@ -246,7 +246,11 @@ pub fn flat<Q: Quad>(patch: &Patch<'_>, frame: &RayFrame, w: f64) -> Option<Curv
 
 /// Heights w within the range whose plane holds the ray's origin, and so all of a ray that is edge-on: roots of
 /// the cubic (v_0 + w n_0 - o) . m(w), m the triangle's area normal at w.
-pub fn planes_that_hold(patch: &Patch<'_>, frame: &RayFrame, [low, high]: [f64; 2]) -> ([f64; 3], usize) {
+pub fn planes_that_hold(
+    patch: &Patch<'_>,
+    frame: &RayFrame,
+    [low, high]: [f64; 2],
+) -> ([f64; 3], usize) {
     let (origin, _) = in_world(frame);
     let volume = |w: f64| {
         let [p, q, r] = corners(patch, origin, w);

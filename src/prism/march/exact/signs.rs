@@ -110,12 +110,7 @@ impl<'a> Signs<'a> {
 
     /// The next point. `guess` is where a crossing since the last one would be.
     #[inline(always)]
-    pub fn point<L: Lanes>(
-        &mut self,
-        curve: &Curve<L::Quad>,
-        (s, above): (f64, bool),
-        guess: f64,
-    ) {
+    pub fn point<L: Lanes>(&mut self, curve: &Curve<L::Quad>, (s, above): (f64, bool), guess: f64) {
         let before = self.above.replace(above);
         // Points that were moved to a texel line may have passed one another by a rounding.
         let last = std::mem::replace(&mut self.last, s).min(s);
@@ -268,9 +263,8 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Dip<'_, Q> {
         let patch = self.problem.patch();
         let sign = if self.above { 1.0 } else { -1.0 };
         // A hair inside: beyond the ends are other cells.
-        let aligned = |s: f64, line: Option<TexelLine>| {
-            line.map_or(s, |line| on_line(self.curve, s, line))
-        };
+        let aligned =
+            |s: f64, line: Option<TexelLine>| line.map_or(s, |line| on_line(self.curve, s, line));
         let from = aligned(self.ends[0], self.lines[0]);
         let to = aligned(self.ends[1], self.lines[1]);
         let hair = 1e-9 * (to - from);

@@ -182,8 +182,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
         let per_world = f64::from(unit) / f64::from(displacement.scale);
         let [w0, dw] = curve.w;
         let [tnear, tfar] = problem.interval;
-        let cut =
-            problem.is_ordered() && (t0 <= f64::from(tnear) || t1 >= f64::from(tfar));
+        let cut = problem.is_ordered() && (t0 <= f64::from(tnear) || t1 >= f64::from(tfar));
         let (area0, area1, area2) = (d0.to_f32(), d1.to_f32(), d2.to_f32());
         let spread = view.spread.to_f32();
         let mut walker = Self {
@@ -197,7 +196,10 @@ impl<'a, L: Lanes> Walker<'a, L> {
             midlevel: unit * displacement.midlevel,
             spread: Vec3::new(spread.x, spread.z, spread.y),
             turns: [spread.x.sqrt(), spread.z.sqrt()],
-            stretch: 1.000_01 / (1.0 - spread.truncate().max_element() / 3.0).max(1e-6).sqrt(),
+            stretch: 1.000_01
+                / (1.0 - spread.truncate().max_element() / 3.0)
+                    .max(1e-6)
+                    .sqrt(),
             cut,
             time: [0.0; 4],
             interval: [0.0; 2],
@@ -355,8 +357,14 @@ impl<'a, L: Lanes> Walker<'a, L> {
             let (off, height_off) = (L::splat(off), L::splat(height_off));
             let [low, high] = self.grid.block_range(
                 level,
-                [L::splat(self.base[0]) + x[r].min(x1) - off, L::splat(self.base[0]) + x[r].max(x1) + off],
-                [L::splat(self.base[1]) + y[r].min(y1) - off, L::splat(self.base[1]) + y[r].max(y1) + off],
+                [
+                    L::splat(self.base[0]) + x[r].min(x1) - off,
+                    L::splat(self.base[0]) + x[r].max(x1) + off,
+                ],
+                [
+                    L::splat(self.base[1]) + y[r].min(y1) - off,
+                    L::splat(self.base[1]) + y[r].max(y1) + off,
+                ],
             );
             range[r] = high - low;
             let above = (high - (h[r].min(h1) - height_off)).sign_mask();
@@ -409,8 +417,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
             let mut length = ds;
             while alive >> last & 1 != 0 {
                 let longer = length + ds;
-                if bounds.bend * longer * longer > CLOSE
-                    || ends.cells(first, last + 1) > MOST_CELLS
+                if bounds.bend * longer * longer > CLOSE || ends.cells(first, last + 1) > MOST_CELLS
                 {
                     break;
                 }

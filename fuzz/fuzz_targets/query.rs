@@ -1,0 +1,140 @@
+//! Any mesh, any map, any ray: what the builders accept is traced without a panic, in bounded time, and every hit is a hit.
+//! The map is edited in between. With FUZZ_SHOW in the environment everything is printed first.
+#![no_main]
+
+mod input;
+
+use std::sync::Arc;
+
+use input::Input;
+use libfuzzer_sys::fuzz_target;
+use prismarch::bvh::BvhTracer;
+use prismarch::prism::{PrismHit, Prisms, SimdLevel};
+use prismarch::ray::Ray;
+use prismarch::surface::{DisplacedSurface, DisplacementMap, NormalMode};
+use prismarch::trace::{Object, Placement, Shape, Tracer, World};
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut input = Input(bytes);
+    let _ = run(&mut input);
+});
+
+/// Prints what a crash was made from.
+fn show(what: &dyn std::fmt::Debug) {
+    if std::env::var_os("FUZZ_SHOW").is_some() {
+        eprintln!("{what:?}");
+    }
+}
+
+/// `None` where a builder refuses.
+fn run(input: &mut Input) -> Option<()> {
+    let mode = match input.byte() % 3 {
+        0 => NormalMode::Smooth {
+            crease_angle: input.number(),
+        },
+        _ => NormalMode::File,
+    };
+    let mesh = input.mesh();
+    show(&(mode, &mesh));
+    let (mesh, _) = mesh.build(mode).ok()?;
+    let (width, height, wrap) = (input.side(), input.side(), input.wrap());
+    let kind = input.byte();
+    let texels = input.texels(kind, width * height);
+    show(&(width, height, wrap, &texels));
+    let map = Arc::new(DisplacementMap::new(width, height, texels, wrap).ok()?);
+    let displacement = input.displacement();
+    let surface = DisplacedSurface::new(Arc::new(mesh), map.clone(), displacement).ok()?;
+    let surface = Arc::new(surface);
+    let options = input.options();
+    show(&(displacement, options));
+
+    let mut both = Vec::new();
+    for level in [SimdLevel::Baseline, SimdLevel::Avx2] {
+        let prisms = Prisms::new(surface.clone(), options).ok()?;
+        both.extend(prisms.with_simd(level).map(Arc::new));
+    }
+    let world = World::new(vec![Object {
+        shape: Shape::Displaced(both[0].clone()),
+        placement: Placement::World,
+        mask: u32::MAX,
+    }]);
+    let mut tracer = BvhTracer::new(&world).ok();
+    for _ in 0..3 {
+        for _ in 0..4 {
+            let ray = input.ray();
+            show(&ray);
+            both.iter().for_each(|prisms| ask(prisms, &ray));
+            if let Some(tracer) = &tracer {
+                let hit = tracer.intersect(&ray);
+                assert_eq!(tracer.occluded(&ray), hit.is_some(), "{ray:?} {hit:?}");
+                if let Some(hit) = hit {
+                    check(&both[0], &ray, hit.prim, [hit.t, hit.u, hit.v], hit.ng);
+                    let point = world.surface_point(&hit);
+                    assert!(!point.position.is_nan(), "{ray:?} {hit:?} {point:?}");
+                }
+            }
+        }
+        if input.is_empty() {
+            return Some(());
+        }
+        let rect = input.rect(width, height);
+        let texels = input.texels(kind, rect.width * rect.height);
+        show(&(rect, &texels));
+        if map.update(rect, &texels).is_ok() {
+            for prisms in &both {
+                prisms.map_edited(rect);
+                assert_hold(prisms, &surface);
+            }
+            tracer = tracer.and_then(|mut tracer| {
+                let edited = tracer.map_edited(&world, &map, rect);
+                edited.is_ok().then_some(tracer)
+            });
+        }
+    }
+    Some(())
+}
+
+/// Asks every primitive about a ray.
+fn ask(prisms: &Prisms, ray: &Ray) {
+    if !ray.is_valid() {
+        return;
+    }
+    for primitive in 0..prisms.len() as u32 {
+        let hit = prisms.intersect(primitive, ray);
+        let occluded = prisms.occluded(primitive, ray);
+        assert_eq!(occluded, hit.is_some(), "{ray:?} {hit:?}");
+        if let Some(PrismHit { prim, t, u, v, ng }) = hit {
+            check(prisms, ray, prim, [t, u, v], ng);
+        }
+    }
+}
+
+fn check(prisms: &Prisms, ray: &Ray, prim: u32, [t, u, v]: [f32; 3], ng: glam::Vec3) {
+    let hit = (ray, prim, t, u, v, ng);
+    assert!(ray.tnear < t && t < ray.tfar && t.is_finite(), "{hit:?}");
+    assert!(u >= 0.0 && v >= 0.0 && u + v <= 1.000_001, "{hit:?}");
+    assert!((ng.length() - 1.0).abs() < 1e-4, "{hit:?}");
+    let triangles = prisms.surface().mesh().triangles().len();
+    assert!((prim as usize) < triangles, "{hit:?}");
+}
+
+/// After an edit the boxes hold the surface. (They may be smaller than those of new prisms: on a tiny map a triangle that
+/// reads few texels is given all.)
+fn assert_hold(prisms: &Prisms, surface: &DisplacedSurface) {
+    for prim in 0..surface.mesh().triangles().len() as u32 {
+        // At most eight triangles: one cluster of the exact march.
+        let bounds = prisms.bounds(prim.min(prisms.len() as u32 - 1));
+        let patch = surface.patch(prim);
+        for (u, v) in [(0.3, 0.3), (0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.5, 0.5)] {
+            let position = patch.point(u, v).position.as_vec3();
+            // Where normals cancel, the surface is cut off.
+            if patch.normal(u, v).length() < 0.01 || !position.is_finite() || !bounds.is_valid() {
+                continue;
+            }
+            let slack = 1e-5 * (bounds.max - bounds.min).max_element();
+            let (low, high) = (bounds.min - slack, bounds.max + slack);
+            let holds = (low.cmple(position) & high.cmpge(position)).all();
+            assert!(holds, "{prim} {u} {v}: {position} {bounds:?}");
+        }
+    }
+}

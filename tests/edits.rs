@@ -1,0 +1,267 @@
+//! Edits of a map in place: a tracer that was told traces what one built afterwards over the same prisms does, bit for bit,
+//! and what one over new prisms does, up to rounding where those have narrower ranges.
+#![cfg(feature = "bvh")]
+
+#[path = "../benches/common/mod.rs"]
+mod common;
+
+use std::sync::Arc;
+
+use common::scene::{RANGE, random, rock_map, sphere};
+use glam::{Affine3A, Vec3};
+use prismarch::bvh::BvhTracer;
+use prismarch::prism::{EditBounds, March, PrismOptions, Prisms};
+use prismarch::ray::Ray;
+use prismarch::surface::{
+    DisplacedSurface, Displacement, DisplacementMap, TexelRect, Texels, UvTransform,
+};
+use prismarch::trace::{Edited, Hit, Object, Placement, Shape, Tracer, World};
+
+const MAP: usize = 64;
+
+/// A sphere in world space and two instances of another over the same map, and a third over a map that is never edited.
+struct Stage {
+    map: Arc<DisplacementMap>,
+    still: Arc<DisplacementMap>,
+}
+
+impl Stage {
+    fn new() -> Self {
+        Self {
+            map: rock_map(MAP, 7),
+            still: rock_map(MAP, 8),
+        }
+    }
+
+    fn world(&self, edit_bounds: EditBounds) -> World {
+        let shape = |subdivisions, map: &Arc<DisplacementMap>, repeats: f32| {
+            let displacement = Displacement {
+                uv: UvTransform {
+                    scale: glam::Vec2::new(repeats, 1.0),
+                    ..UvTransform::default()
+                },
+                ..Displacement::new(RANGE)
+            };
+            let surface = DisplacedSurface::new(sphere(subdivisions), map.clone(), displacement);
+            let options = PrismOptions {
+                march: March::Exact,
+                edit_bounds,
+            };
+            let prisms = Prisms::new(Arc::new(surface.unwrap()), options).unwrap();
+            Shape::Displaced(Arc::new(prisms))
+        };
+        let object = |shape, placement| Object {
+            shape,
+            placement,
+            mask: u32::MAX,
+        };
+        let at = |x: f32| Affine3A::from_translation(Vec3::X * x);
+        World::new(vec![
+            object(shape(2, &self.map, 1.0), Placement::World),
+            object(
+                shape(1, &self.map, 2.0),
+                Placement::Instances(vec![at(3.0), at(-3.0)]),
+            ),
+            object(
+                shape(1, &self.still, 1.0),
+                Placement::Instances(vec![at(6.0)]),
+            ),
+        ])
+    }
+
+    /// Sets a random rectangle to random heights from `low` to `high`.
+    fn edit(&self, number: u32, [low, high]: [u16; 2]) -> TexelRect {
+        let random = |salt: u32| random(97 * number + salt);
+        let start = |salt| (random(salt) * (MAP - 1) as f32) as usize;
+        let (x, y) = (start(0), start(1));
+        let side =
+            |salt, start: usize| 1 + (random(salt).powi(2) * (MAP - start - 1) as f32) as usize;
+        let rect = TexelRect {
+            x,
+            y,
+            width: side(2, x),
+            height: side(3, y),
+        };
+        let height = |i: usize| {
+            let span = f32::from(high - low);
+            low + (random(4 + i as u32) * span) as u16
+        };
+        let texels = Texels::U16((0..rect.width * rect.height).map(height).collect());
+        self.map.update(rect, &texels).unwrap();
+        rect
+    }
+}
+
+fn rays(seed: u32) -> impl Iterator<Item = Ray> {
+    (0..3000).map(move |i| {
+        let number = |k: u32| 2.0 * random(seed ^ (i * 8 + k)) - 1.0;
+        let origin = Vec3::new(8.0 * number(0), 5.0 * number(1), 5.0 * number(2));
+        let target = Vec3::new(7.0 * number(3), number(4), number(5));
+        Ray::new(origin, target - origin)
+    })
+}
+
+/// What a tracer of either backend must do; `told` takes an edit over.
+fn law<T: Tracer>(
+    edit_bounds: EditBounds,
+    build: impl Fn(&World) -> T,
+    told: impl Fn(&mut T, &World, &Arc<DisplacementMap>, TexelRect) -> Edited,
+) {
+    let stage = Stage::new();
+    let world = stage.world(edit_bounds);
+    let mut tracer = build(&world);
+    let mut commits = 0;
+    for number in 0..8 {
+        let before: Vec<_> = bounds(&world);
+        let rect = stage.edit(number, [0, u16::MAX]);
+        let edited = told(&mut tracer, &world, &stage.map, rect);
+        assert_eq!(edited.committed, before != bounds(&world), "{rect}");
+        commits += u32::from(edited.committed);
+        assert_same(&tracer, &build(&world), number);
+        assert_like(
+            &tracer,
+            &build(&stage.world(edit_bounds)),
+            edit_bounds,
+            number,
+        );
+        // Told twice, it has nothing left to do.
+        let nothing = told(&mut tracer, &world, &stage.map, rect);
+        assert!(!nothing.committed);
+    }
+    match edit_bounds {
+        EditBounds::Tight => assert!(commits > 0),
+        EditBounds::Range => assert_eq!(commits, 0),
+    }
+    // Full height everywhere and then less: there is room.
+    let all = TexelRect {
+        x: 0,
+        y: 0,
+        width: MAP,
+        height: MAP,
+    };
+    for height in [0, u16::MAX] {
+        stage
+            .map
+            .update(all, &Texels::U16(vec![height; MAP * MAP]))
+            .unwrap();
+        told(&mut tracer, &world, &stage.map, all);
+    }
+    for number in 8..12 {
+        let rect = stage.edit(number, [500, 65_000]);
+        let edited = told(&mut tracer, &world, &stage.map, rect);
+        assert!(!edited.committed);
+        assert_eq!(edited.prims_touched > 0, edit_bounds == EditBounds::Tight);
+        assert_same(&tracer, &build(&world), number);
+        assert_like(
+            &tracer,
+            &build(&stage.world(edit_bounds)),
+            edit_bounds,
+            number,
+        );
+    }
+}
+
+fn bounds(world: &World) -> Vec<prismarch::ray::Aabb> {
+    let of = |object: &Object| match &object.shape {
+        Shape::Displaced(prisms) => (0..prisms.len() as u32).map(|p| prisms.bounds(p)).collect(),
+        Shape::Triangles(_) => Vec::new(),
+    };
+    world.objects().iter().flat_map(of).collect()
+}
+
+/// `tracer` against one over new prisms. Where those have narrower ranges, roots are rounded from elsewhere.
+fn assert_like(tracer: &impl Tracer, new: &impl Tracer, edit_bounds: EditBounds, seed: u32) {
+    if edit_bounds == EditBounds::Range {
+        return assert_same(tracer, new, seed);
+    }
+    let mut grazes = 0;
+    for ray in rays(seed.wrapping_mul(0x1234_5677)) {
+        match (tracer.intersect(&ray), new.intersect(&ray)) {
+            (None, None) => {}
+            (Some(a), Some(b)) if (a.t - b.t).abs() <= 2e-6 * b.t => {}
+            _ => grazes += 1,
+        }
+    }
+    assert!(grazes <= 1, "{grazes}");
+}
+
+/// The hits of `tracer` are those of `new`, but for the name of what is hit twice at the same t.
+fn assert_same(tracer: &impl Tracer, new: &impl Tracer, seed: u32) {
+    let mut hits = 0;
+    for ray in rays(seed.wrapping_mul(0x1234_5677)) {
+        let (a, b) = (tracer.intersect(&ray), new.intersect(&ray));
+        let t = |hit: &Option<Hit>| hit.map(|hit| hit.t.to_bits());
+        assert_eq!(t(&a), t(&b), "{ray:?}\n{a:?}\n{b:?}");
+        if let (Some(a), Some(b)) = (a, b)
+            && (a.prim, a.geom, a.inst) == (b.prim, b.geom, b.inst)
+        {
+            assert_eq!(a, b, "{ray:?}");
+            hits += 1;
+        }
+        assert_eq!(tracer.occluded(&ray), a.is_some(), "{ray:?}");
+    }
+    assert!(hits > 500, "{hits}");
+}
+
+#[test]
+fn edits_under_obvhs_are_as_good_as_a_new_tracer() {
+    for edit_bounds in [EditBounds::Tight, EditBounds::Range] {
+        law(
+            edit_bounds,
+            |world| BvhTracer::new(world).unwrap(),
+            |tracer, world, map, rect| tracer.map_edited(world, map, rect).unwrap(),
+        );
+    }
+}
+
+#[cfg(feature = "embree")]
+mod embree {
+    use super::*;
+    use prismarch::embree::{EmbreeOptions, EmbreeTracer};
+
+    #[test]
+    fn edits_under_embree_are_as_good_as_a_new_tracer() {
+        for editable in [false, true] {
+            let options = EmbreeOptions {
+                editable,
+                ..EmbreeOptions::default()
+            };
+            for edit_bounds in [EditBounds::Tight, EditBounds::Range] {
+                law(
+                    edit_bounds,
+                    |world| EmbreeTracer::new(world, &options).unwrap(),
+                    |tracer, world, map, rect| tracer.map_edited(world, map, rect).unwrap(),
+                );
+            }
+        }
+    }
+
+    /// The first to be told makes the bounds grow; the second must not take that for nothing new.
+    #[test]
+    fn two_tracers_of_the_same_prisms_both_follow() {
+        let stage = Stage::new();
+        let world = stage.world(EditBounds::Tight);
+        let mut embree = EmbreeTracer::new(&world, &EmbreeOptions::default()).unwrap();
+        let mut bvh = BvhTracer::new(&world).unwrap();
+        let rect = TexelRect {
+            x: 10,
+            y: 20,
+            width: 20,
+            height: 20,
+        };
+        stage
+            .map
+            .update(rect, &Texels::U16(vec![u16::MAX; 400]))
+            .unwrap();
+        assert!(
+            embree
+                .map_edited(&world, &stage.map, rect)
+                .unwrap()
+                .committed
+        );
+        assert!(bvh.map_edited(&world, &stage.map, rect).unwrap().committed);
+        assert_same(&bvh, &BvhTracer::new(&world).unwrap(), 3);
+        // Instances round differently: the box will do.
+        assert!((embree.bounds().max - bvh.bounds().max).abs().max_element() < 1e-4);
+    }
+}
