@@ -76,9 +76,8 @@ impl Cluster {
                     cluster.vertices[k][axis][l] = v[k][axis];
                     cluster.normals[k][axis][l] = n[k][axis];
                 }
-                for axis in 0..2 {
-                    cluster.texcoords[k][axis][l] = st[k][axis];
-                }
+                cluster.texcoords[k][0][l] = st[k].x;
+                cluster.texcoords[k][1][l] = st[k].y;
             }
             let range = offsets(prim);
             for (end, w) in range.into_iter().enumerate() {
@@ -279,13 +278,14 @@ fn is_folded(patch: &Patch<'_>, [low, high]: [f64; 2]) -> bool {
 /// Median cuts along the longest side of the centroids' box, at multiples of the group's size.
 pub fn groups(centroids: &[DVec3]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..centroids.len() as u32).collect();
-    let mut waiting = vec![0..order.len()];
-    while let Some(range) = waiting.pop() {
+    let mut waiting = vec![(0, order.len())];
+    while let Some((start, end)) = waiting.pop() {
+        let range = start..end;
         if range.len() <= LANES {
             order[range].sort_unstable();
             continue;
         }
-        let part = &mut order[range.clone()];
+        let part = &mut order[range];
         let (low, high) = part.iter().fold(
             (DVec3::INFINITY, DVec3::NEG_INFINITY),
             |(low, high), &prim| {
@@ -300,8 +300,8 @@ pub fn groups(centroids: &[DVec3]) -> Vec<u32> {
             let ((x, i), (y, j)) = (key(a), key(b));
             x.total_cmp(&y).then(i.cmp(&j))
         });
-        waiting.push(range.start..range.start + half);
-        waiting.push(range.start + half..range.end);
+        waiting.push((start, start + half));
+        waiting.push((start + half, end));
     }
     order
 }

@@ -198,6 +198,16 @@ impl StoredTexels {
         }
     }
 
+    /// Texel `index` as stored.
+    #[cfg(test)]
+    pub fn get(&self, index: usize) -> f32 {
+        match self {
+            Self::U8(t) => u8::load(&t[index]).into(),
+            Self::U16(t) => u16::load(&t[index]).into(),
+            Self::F32(t) => f32::load(&t[index]),
+        }
+    }
+
     /// The texels at the corners (0,0) (1,0) (0,1) (1,1) of the cell at `index`, as stored.
     #[inline(always)]
     pub fn cell(&self, index: usize, stride: usize) -> [f32; 4] {

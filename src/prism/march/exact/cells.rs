@@ -199,7 +199,8 @@ impl Chord {
             (line - self.from[axis]) / (self.to[axis] - self.from[axis])
         };
         let (x, y) = (leaves(0), leaves(1));
-        let axis = usize::from(!(x <= y));
+        // Along y, x is infinite or no number.
+        let axis = if x <= y { 0 } else { 1 };
         (x.min(y) < 1.0).then(|| self.line(cells, lane, axis, 1.0))
     }
 

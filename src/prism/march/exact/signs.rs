@@ -236,10 +236,11 @@ fn on_line<Q: Quad>(curve: &Curve<Q>, near: f64, line: TexelLine) -> f64 {
         let moved = s - miss / change.to_array()[line.axis];
         // Where the curve runs along the line there is nothing to be gained.
         const FAR: f64 = 1.0 / 64.0;
-        if !((moved - near).abs() <= FAR) {
+        if (moved - near).abs() <= FAR {
+            s = moved;
+        } else {
             return near;
         }
-        s = moved;
     }
     s.clamp(0.0, 1.0)
 }
