@@ -20,7 +20,13 @@ pub struct Signs<'a> {
     last: f64,
     nearest: Option<Found>,
     done: bool,
+    /// Spans that may still be looked at.
+    patience: u32,
 }
+
+/// Spans that one ray may look at in one prism, some 10^8 texels: reached only where texture coordinates repeat a map
+/// millions of times over a triangle. What is behind is not looked for, so that no ray hangs.
+const MOST_SPANS: u32 = 1 << 20;
 
 /// g and its derivative by s.
 struct Height {
@@ -38,6 +44,7 @@ impl<'a> Signs<'a> {
             last: 0.0,
             nearest: None,
             done: false,
+            patience: MOST_SPANS,
         }
     }
 
@@ -50,6 +57,13 @@ impl<'a> Signs<'a> {
     #[inline(always)]
     pub fn is_done(&self) -> bool {
         self.done
+    }
+
+    /// Counts a span; ends the search where there were too many.
+    #[inline(always)]
+    pub fn count_span(&mut self) {
+        self.patience = self.patience.saturating_sub(1);
+        self.done |= self.patience == 0;
     }
 
     /// A new curve begins where the last one ended.

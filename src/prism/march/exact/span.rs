@@ -252,6 +252,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
     #[inline(always)]
     fn walk_here(&self, signs: &mut Signs<'_>) {
         signs.begin();
+        signs.count_span();
         let whole = [0.0, 1.0];
         let (alive, ends, bounds) = self.children(whole);
         if alive == 0 {
@@ -293,6 +294,10 @@ impl<'a, L: Lanes> Walker<'a, L> {
         };
         stack.postpone(children, count, [0.0, 1.0]);
         while let Some(span) = stack.pop() {
+            signs.count_span();
+            if signs.is_done() {
+                return;
+            }
             let (alive, ends, bounds) = self.children(span);
             if alive == 0 {
                 continue;
