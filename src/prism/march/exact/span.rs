@@ -21,7 +21,7 @@ use crate::prism::curve::{Curve, View};
 use crate::prism::simd::{Grid, LANES, Lanes, Quad, Task};
 
 /// A chord this close to the curve, in texels, may be walked cell by cell.
-const CLOSE: f32 = 1.0 / 64.0;
+const CLOSE: f32 = 1.0 / 256.0;
 
 /// Texels beyond which a span has 15 children.
 const WIDE: f32 = 10.0;
