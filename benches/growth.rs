@@ -70,7 +70,10 @@ fn print(what: &str, mut cases: Vec<Case>) {
     println!("| --- | --- | --- | --- |");
     for case in &cases {
         let [primary, bounce, occlusion] = case.times.rates(&case.rays).map(|rate| 1e3 / rate);
-        println!("| {} | {primary:.0} | {bounce:.0} | {occlusion:.0} |", case.name);
+        println!(
+            "| {} | {primary:.0} | {bounce:.0} | {occlusion:.0} |",
+            case.name
+        );
     }
     println!();
 }

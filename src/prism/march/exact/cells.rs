@@ -154,30 +154,42 @@ impl Chord {
             let (start, length) = (cells.start[lane], cells.length[lane]);
             let [f0, f1, f2] = [cells.f[0][lane], cells.f[1][lane], cells.f[2][lane]];
             let end = f0 + f1 + f2;
+            // Signs at both ends that differ by more than f may be off: one crossing, whatever else. In all other lanes
+            // f64 looks, exactly on the texel lines.
+            let sure = |f: f32| f.abs() > self.off;
+            let certain = sure(f0) && sure(end) && (f0 > 0.0) != (end > 0.0);
             let lines = [self.begin_line(cells, lane), self.end_line(cells, lane)];
-            let before = Side::of(f0, self.off, lines[0]);
-            let after = Side::of(end, self.off, lines[1]);
-            let unknown = |side| matches!(side, Side::Unknown(_));
-            let certain = !unknown(before) && !unknown(after) && before != after;
-            let (from, above) = signs.look::<L>(curve, s(start), before);
-            signs.point::<L>(curve, (from, above), from);
-            if signs.is_done() {
-                return;
+            let side = |f: f32, line| {
+                if certain {
+                    Side::of(f)
+                } else {
+                    Side::Unknown(line)
+                }
+            };
+            // Between the last point and this lane nothing is crossed: only the first lane needs its beginning.
+            if signs.is_fresh() {
+                let begin = signs.look::<L>(curve, s(start), side(f0, lines[0]));
+                signs.point::<L>(curve, begin, begin.0);
             }
             if certain && !self.cut && signs.any_will_do() {
                 return signs.found_any();
             }
-            let (to, above_after) = signs.look::<L>(curve, s(start + length), after);
-            if above == above_after
-                && let Some(dip) = signs.dip::<L>(curve, [from, to], lines, above)
+            let after = signs.look::<L>(curve, s(start + length), side(end, lines[1]));
+            // At a corner of the grid two lanes begin at once, and the shorter one may come second.
+            if after.0 <= signs.last_point() {
+                continue;
+            }
+            if !certain
+                && signs.is_above() == Some(after.1)
+                && let Some(dip) = signs.dip::<L>(curve, [s(start), after.0], lines, after.1)
             {
-                signs.point::<L>(curve, (dip, !above), dip);
+                signs.point::<L>(curve, (dip, !after.1), dip);
                 if signs.is_done() {
                     return;
                 }
             }
             let root = start + length * root(f0, f1, f2);
-            signs.point::<L>(curve, (to, above_after), s(root));
+            signs.point::<L>(curve, after, s(root));
             if signs.is_done() {
                 return;
             }

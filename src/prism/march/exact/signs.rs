@@ -53,6 +53,24 @@ impl<'a> Signs<'a> {
         self.nearest
     }
 
+    /// Whether no point has been reported yet.
+    #[inline(always)]
+    pub fn is_fresh(&self) -> bool {
+        self.above.is_none()
+    }
+
+    /// Where the last point was.
+    #[inline(always)]
+    pub fn last_point(&self) -> f64 {
+        self.last
+    }
+
+    /// The side of the last point.
+    #[inline(always)]
+    pub fn is_above(&self) -> Option<bool> {
+        self.above
+    }
+
     /// Whether nothing behind is wanted.
     #[inline(always)]
     pub fn is_done(&self) -> bool {
@@ -126,8 +144,7 @@ impl<'a> Signs<'a> {
     #[inline(always)]
     pub fn point<L: Lanes>(&mut self, curve: &Curve<L::Quad>, (s, above): (f64, bool), guess: f64) {
         let before = self.above.replace(above);
-        // Points that were moved to a texel line may have passed one another by a rounding.
-        let last = std::mem::replace(&mut self.last, s).min(s);
+        let last = std::mem::replace(&mut self.last, s);
         if before.is_none_or(|before| before == above) {
             return;
         }
@@ -158,16 +175,10 @@ pub enum Side {
 }
 
 impl Side {
-    /// By f, which may be off by `off`.
+    /// By the sign of f.
     #[inline(always)]
-    pub fn of(f: f32, off: f32, line: Option<TexelLine>) -> Self {
-        if f > off {
-            Self::Above
-        } else if f < -off {
-            Self::Below
-        } else {
-            Self::Unknown(line)
-        }
+    pub fn of(f: f32) -> Self {
+        if f > 0.0 { Self::Above } else { Self::Below }
     }
 }
 
