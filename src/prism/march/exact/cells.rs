@@ -155,44 +155,61 @@ impl Chord {
             let [f0, f1, f2] = [cells.f[0][lane], cells.f[1][lane], cells.f[2][lane]];
             let end = f0 + f1 + f2;
             // Signs at both ends that differ by more than f may be off: one crossing, whatever else. In all other lanes
-            // f64 looks, exactly on the texel lines.
+            // f64 looks: where the chord passes the texel lines, since what is proven of lanes is proven up to there,
+            // and where the curve does, since there are the crests.
             let sure = |f: f32| f.abs() > self.off;
             let certain = sure(f0) && sure(end) && (f0 > 0.0) != (end > 0.0);
-            let lines = [self.begin_line(cells, lane), self.end_line(cells, lane)];
-            let side = |f: f32, line| {
-                if certain {
-                    Side::of(f)
-                } else {
-                    Side::Unknown(line)
-                }
-            };
+            let (from, to) = (s(start), s(start + length));
             // Between the last point and this lane nothing is crossed: only the first lane needs its beginning.
             if signs.is_fresh() {
-                let begin = signs.look::<L>(curve, s(start), side(f0, lines[0]));
-                signs.point::<L>(curve, begin, begin.0);
+                let side = if certain {
+                    Side::of(f0)
+                } else {
+                    Side::Unknown(None)
+                };
+                let begin = signs.look::<L>(curve, from, side);
+                signs.point::<L>(curve, begin, from);
             }
-            if certain && !self.cut && signs.any_will_do() {
-                return signs.found_any();
-            }
-            let after = signs.look::<L>(curve, s(start + length), side(end, lines[1]));
-            // At a corner of the grid two lanes begin at once, and the shorter one may come second.
-            if after.0 <= signs.last_point() {
-                continue;
-            }
-            if !certain
-                && signs.is_above() == Some(after.1)
-                && let Some(dip) = signs.dip::<L>(curve, [s(start), after.0], lines, after.1)
-            {
-                signs.point::<L>(curve, (dip, !after.1), dip);
-                if signs.is_done() {
-                    return;
+            let root = s(start + length * root(f0, f1, f2));
+            if certain {
+                if !self.cut && signs.any_will_do() {
+                    return signs.found_any();
                 }
+                signs.point::<L>(curve, (to, end > 0.0), root);
+            } else {
+                let lines = [self.begin_line(cells, lane), self.end_line(cells, lane)];
+                self.look_closely::<L>([from, to], lines, root, curve, signs);
             }
-            let root = start + length * root(f0, f1, f2);
-            signs.point::<L>(curve, after, s(root));
             if signs.is_done() {
                 return;
             }
+        }
+    }
+
+    /// All points of a lane of which f32 knows too little.
+    #[inline(always)]
+    fn look_closely<L: Lanes>(
+        &self,
+        [from, to]: [f64; 2],
+        lines: [Option<TexelLine>; 2],
+        root: f64,
+        curve: &Curve<L::Quad>,
+        signs: &mut Signs<'_>,
+    ) {
+        if lines[0].is_some() {
+            let begin = signs.look::<L>(curve, from, Side::Unknown(lines[0]));
+            signs.point::<L>(curve, begin, begin.0);
+        }
+        let after = signs.look::<L>(curve, to, Side::Unknown(lines[1]));
+        if signs.is_above() == Some(after.1)
+            && let Some(dip) = signs.dip::<L>(curve, [from, to], lines, after.1)
+        {
+            signs.point::<L>(curve, (dip, !after.1), dip);
+        }
+        signs.point::<L>(curve, after, root);
+        if lines[1].is_some() && to > after.0 {
+            let beyond = signs.look::<L>(curve, to, Side::Unknown(None));
+            signs.point::<L>(curve, beyond, to);
         }
     }
 

@@ -59,12 +59,6 @@ impl<'a> Signs<'a> {
         self.above.is_none()
     }
 
-    /// Where the last point was.
-    #[inline(always)]
-    pub fn last_point(&self) -> f64 {
-        self.last
-    }
-
     /// The side of the last point.
     #[inline(always)]
     pub fn is_above(&self) -> Option<bool> {
@@ -143,6 +137,10 @@ impl<'a> Signs<'a> {
     /// The next point. `guess` is where a crossing since the last one would be.
     #[inline(always)]
     pub fn point<L: Lanes>(&mut self, curve: &Curve<L::Quad>, (s, above): (f64, bool), guess: f64) {
+        // At a corner of the grid two lanes begin at once, and the shorter one may come second.
+        if self.done || (s <= self.last && self.above.is_some()) {
+            return;
+        }
         let before = self.above.replace(above);
         let last = std::mem::replace(&mut self.last, s);
         if before.is_none_or(|before| before == above) {
