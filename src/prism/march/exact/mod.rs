@@ -9,6 +9,7 @@
 //! is found, and the number of crossings in a prism has the parity of the signs at its ends, which neighbours share.
 
 mod cells;
+mod children;
 mod pieces;
 mod signs;
 mod span;

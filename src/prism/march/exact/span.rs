@@ -16,18 +16,16 @@ use glam::{Vec3, Vec4};
 
 use super::Problem;
 use super::cells::{Chord, MOST_CELLS, NUDGE};
+use super::children::{Ends, Stack, at, of};
 use super::signs::{Side, Signs};
 use crate::prism::curve::{Curve, View};
-use crate::prism::simd::{Grid, LANES, Lanes, Quad, Task};
+use crate::prism::simd::{Grid, Lanes, Quad, Task};
 
 /// A chord this close to the curve, in texels, may be walked cell by cell.
 const CLOSE: f32 = 1.0 / 256.0;
 
 /// Texels beyond which a span has 15 children.
 const WIDE: f32 = 10.0;
-
-/// Spans that can wait: see [`Walker::descend`].
-const STACK: usize = 160;
 
 /// An f32 value is within this many units in the last place of the magnitudes it was computed from.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
@@ -104,58 +102,6 @@ impl<L: Lanes> Task<L> for Deep<'_, '_, '_, L> {
     #[inline(always)]
     fn run(self) {
         self.walker.descend(self.children, self.count, self.signs);
-    }
-}
-
-/// Spans waiting, the next one last.
-struct Stack {
-    spans: [[f32; 2]; STACK],
-    count: usize,
-}
-
-impl Stack {
-    #[inline(always)]
-    fn pop(&mut self) -> Option<[f32; 2]> {
-        self.count = self.count.checked_sub(1)?;
-        Some(self.spans[self.count])
-    }
-
-    /// Takes in the named children of a span that was cut into `count`.
-    #[inline(always)]
-    fn postpone(&mut self, mut children: u32, count: usize, span: [f32; 2]) {
-        if self.count + 2 * LANES > STACK && children != 0 {
-            // Never lost: two long spans instead of many short ones.
-            let first = children.trailing_zeros() as usize;
-            let last = 32 - children.leading_zeros() as usize;
-            let (a, b) = (at(span, first, count), at(span, last, count));
-            let middle = 0.5 * (a + b);
-            self.push([middle, b]);
-            self.push([a, middle]);
-            return;
-        }
-        while children != 0 {
-            let last = 31 - children.leading_zeros() as usize;
-            children &= !(1 << last);
-            self.push([at(span, last, count), at(span, last + 1, count)]);
-        }
-    }
-
-    #[inline(always)]
-    fn push(&mut self, span: [f32; 2]) {
-        if self.count < STACK {
-            self.spans[self.count] = span;
-            self.count += 1;
-        }
-    }
-}
-
-/// Where child k of a span that was cut into `count` begins.
-#[inline(always)]
-fn at([from, to]: [f32; 2], k: usize, count: usize) -> f32 {
-    if k == count {
-        to
-    } else {
-        from + (to - from) * (k as f32 / count as f32)
     }
 }
 
@@ -285,13 +231,10 @@ impl<'a, L: Lanes> Walker<'a, L> {
     /// Goes down below the children of the whole curve that could not be walked at once.
     ///
     /// A waiting span is at most a seventh of the one it came from, and all that wait come from different levels or the same
-    /// span, so a stack of [`STACK`] holds ten levels; deeper ones, and f32 cannot tell many more apart, are halved instead.
+    /// span, so a stack of [`Stack::MOST`] holds ten levels; deeper ones, and f32 cannot tell many more apart, are halved instead.
     #[inline(always)]
     fn descend(&self, children: u32, count: usize, signs: &mut Signs<'_>) {
-        let mut stack = Stack {
-            spans: [[0.0; 2]; STACK],
-            count: 0,
-        };
+        let mut stack = Stack::new();
         stack.postpone(children, count, [0.0, 1.0]);
         while let Some(span) = stack.pop() {
             signs.count_span();
@@ -552,65 +495,4 @@ impl Span {
             height_rounding,
         }
     }
-}
-
-/// One number for each end of up to 15 children.
-type Row = [[f32; LANES]; 2];
-
-/// The ends of up to 15 children.
-struct Ends {
-    children: usize,
-    x: Row,
-    y: Row,
-    h: Row,
-    /// Texel cells of (x, y).
-    i: Row,
-    j: Row,
-    /// Largest minus smallest stored texel around each child.
-    range: Row,
-}
-
-impl Ends {
-    #[inline(always)]
-    fn new<L: Lanes, const R: usize>(
-        children: usize,
-        x: &[L; R],
-        y: &[L; R],
-        h: &[L; R],
-        range: &[L; R],
-    ) -> Self {
-        // Of one register the second copy is never looked at.
-        let last = R - 1;
-        Self {
-            children,
-            x: [x[0].to_array(), x[last].to_array()],
-            y: [y[0].to_array(), y[last].to_array()],
-            h: [h[0].to_array(), h[last].to_array()],
-            i: [x[0].floor().to_array(), x[last].floor().to_array()],
-            j: [y[0].floor().to_array(), y[last].floor().to_array()],
-            range: [range[0].to_array(), range[last].to_array()],
-        }
-    }
-
-    #[inline(always)]
-    fn point(&self, k: usize) -> [f32; 3] {
-        [of(&self.x, k), of(&self.y, k), of(&self.h, k)]
-    }
-
-    #[inline(always)]
-    fn cell(&self, k: usize) -> [f32; 2] {
-        [of(&self.i, k), of(&self.j, k)]
-    }
-
-    /// Texel cells that the chord from end `a` to end `b` crosses.
-    #[inline(always)]
-    fn cells(&self, a: usize, b: usize) -> f32 {
-        let ([i0, j0], [i1, j1]) = (self.cell(a), self.cell(b));
-        (i1 - i0).abs() + (j1 - j0).abs() + 1.0
-    }
-}
-
-#[inline(always)]
-fn of(row: &Row, k: usize) -> f32 {
-    row.as_flattened()[k & 15]
 }
