@@ -222,13 +222,12 @@ fn odd_lines(prisms: &Prisms, count: usize, half: f32) -> (usize, usize) {
 
 /// Lines cross the closed surface as they cross the base mesh: evenly, if that is closed; the open one not always.
 ///
-/// `lost` of a thousand lines may be odd: over a rough map two crossings may be so near one another, at a crest between
-/// texel cells, that a ray that starts between them no longer sees the second.
+/// `lost` of the lines are known to be odd.
 fn is_closed(surface: &DisplacedSurface, half: f32, lost: usize) {
     const LINES: usize = 4000;
     for prisms in levels(surface, Seams::Closed) {
         let (odd, walls) = odd_lines(&prisms, LINES, half);
-        assert!(odd <= LINES * lost / 1000, "{odd} of {LINES}");
+        assert!(odd <= lost, "{odd} of {LINES}");
         assert!(walls > LINES / 100, "{walls}");
     }
     for prisms in levels(surface, Seams::Open) {
@@ -237,8 +236,9 @@ fn is_closed(surface: &DisplacedSurface, half: f32, lost: usize) {
     }
 }
 
-/// Lines that may be lost in a thousand over a map of noise of this many texels.
-const NOISE: [(usize, usize); 2] = [(3, 0), (16, 2)];
+/// Sides of the maps of noise, and how many of the 4000 lines through the cube are odd over each. A known fault, not a
+/// rounding: right behind a pair of close crossings a ray may miss one that comes later (docs/exact.md, Watertightness).
+const NOISE: [(usize, usize); 2] = [(3, 0), (16, 1)];
 
 #[test]
 fn a_cube_with_hard_edges_is_a_solid() {
@@ -257,10 +257,10 @@ fn a_cube_with_hard_edges_is_a_solid() {
 #[test]
 fn a_sphere_with_a_seam_is_a_solid() {
     for (scale, midlevel) in [(0.2, 0.0), (0.3, 0.5)] {
-        for (size, lost) in NOISE {
+        for (size, _) in NOISE {
             let map = rough(size, Wrap::Repeat);
             let surface = surface(&sphere(12, 8), map, jumping(scale, midlevel));
-            is_closed(&surface, 1.2, lost);
+            is_closed(&surface, 1.2, 0);
         }
     }
 }
@@ -282,9 +282,9 @@ fn a_patch_with_borders_is_closed_down_to_its_base() {
     };
     let cells = [(-1.0, -1.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 0.0)];
     let corners = cells.map(|(x, y)| cell(x, y)).concat();
-    for (size, lost) in NOISE {
+    for (size, _) in NOISE {
         let surface = surface(&corners, rough(size, Wrap::Mirror), jumping(0.5, 0.3));
-        is_closed(&surface, 1.1, lost);
+        is_closed(&surface, 1.1, 0);
     }
 }
 
