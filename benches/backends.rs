@@ -9,8 +9,9 @@ mod common;
 
 use std::sync::Arc;
 
+use common::boulder;
 use common::rays::Rays;
-use common::scene::{prisms, rock_map, sphere};
+use common::scene::{prisms, sphere};
 use common::timing::{RayTimes, Times, option};
 use prismarch::bvh::BvhTracer;
 use prismarch::embree::{
@@ -69,10 +70,10 @@ impl<T: Tracer> Contestant<T> {
 }
 
 fn main() {
-    let map = rock_map(option("--map", 4096), 1);
+    let map = boulder::map(option("--map", 4096));
     let size = option("--size", 1024) as u32;
     let rounds = option("--rounds", 5);
-    let base = sphere(3);
+    let base = boulder::mesh(8, map.size().0);
     let fine = sphere(7);
 
     let displaced = Shape::Displaced(Arc::new(prisms(&base, &map, March::default())));

@@ -3,16 +3,16 @@
 //! The unit sphere of the other benches (1280 prisms, a 16-bit map of rock); an edit is 64 x 64 texels somewhere on the map. It
 //! either stays within the heights that its prisms hold (the texels become their mean), or goes beyond (they become a hill up to the
 //! map's largest height). Beside it, in the same rounds: all primary rays of a picture on two threads.
-//! Options after `--`: `--map TEXELS`, `--size PIXELS`, `--rounds N`, `--subdivisions N` (of the
-//! sphere: 20 * 4^N prisms). Prints Markdown tables.
+//! Options after `--`: `--map TEXELS`, `--size PIXELS`, `--rounds N`, `--cells N` (20 N^2 prisms). Prints Markdown tables.
 
 #[path = "common/mod.rs"]
 mod common;
 
 use std::sync::Arc;
 
+use common::boulder;
 use common::rays::Rays;
-use common::scene::{displaced, random, rock_map, sphere};
+use common::scene::{displaced, random};
 use common::timing::{RayTimes, Times, option};
 use glam::Vec3;
 use prismarch::bvh::BvhTracer;
@@ -71,10 +71,10 @@ enum Edit {
 }
 
 fn main() {
-    let map = rock_map(option("--map", 4096), 1);
+    let map = boulder::map(option("--map", 4096));
     let size = option("--size", 1024) as u32;
     let rounds = option("--rounds", 15) as u32;
-    let mesh = sphere(option("--subdivisions", 3) as u32);
+    let mesh = boulder::mesh(option("--cells", 8), map.size().0);
     type Build = fn(&World) -> Box<dyn Editable>;
     let embree: Build = |world| build_embree(world, false);
     let editable: Build = |world| build_embree(world, true);

@@ -1,6 +1,6 @@
 //! How the time of a ray grows with the map and with the mesh: `cargo bench --bench growth`.
 //!
-//! The displaced unit sphere of `common/scene.rs` under Embree, one thread, exact march: maps from 64x64 to 8192x8192 over 1280 base
+//! The boulder of `common/boulder.rs` under Embree, one thread, exact march: maps from 64x64 to 8192x8192 over 1280 base
 //! triangles, then 80 to 1.3 million base triangles under a 4096x4096 map. Options after `--`: `--size PIXELS`,
 //! `--rounds N`. Prints two Markdown tables of nanoseconds per ray.
 
@@ -9,8 +9,9 @@ mod common;
 
 use std::sync::Arc;
 
+use common::boulder;
 use common::rays::Rays;
-use common::scene::{prisms, rock_map, sphere};
+use common::scene::prisms;
 use common::timing::{RayTimes, option};
 use prismarch::embree::{EmbreeOptions, EmbreeTracer};
 use prismarch::prism::March;
@@ -25,21 +26,21 @@ struct Case {
 }
 
 fn main() {
-    let mesh = sphere(3);
     let texels_per_triangle = |side: usize| {
-        let texels = side as f64 * side as f64 / mesh.triangles().len() as f64;
-        // The side of the square that holds as many.
-        format!("{side}x{side}: {:.0}^2 texels per triangle", texels.sqrt())
+        // A side of the square that holds as many.
+        let texels = (side / 4 - 8) as f64 / 8.0 / 2f64.sqrt();
+        format!("{side}x{side}: {texels:.0}^2 texels per triangle")
     };
     let maps = (6..=13).map(|power| {
-        let map = rock_map(1 << power, 1);
-        case(texels_per_triangle(1 << power), &mesh, &map)
+        let size = 1 << power;
+        let (mesh, map) = (boulder::mesh(8, size), boulder::map(size));
+        case(texels_per_triangle(size), &mesh, &map)
     });
     print("map over 1280 base triangles", maps.collect());
 
-    let map = rock_map(4096, 1);
-    let meshes = (1..=8).map(|subdivisions| {
-        let mesh = sphere(subdivisions);
+    let map = boulder::map(4096);
+    let meshes = (1..=8).map(|power| {
+        let mesh = boulder::mesh(1 << power, 4096);
         case(mesh.triangles().len().to_string(), &mesh, &map)
     });
     print("base triangles under a 4096x4096 map", meshes.collect());

@@ -8,8 +8,9 @@ mod common;
 
 use std::sync::Arc;
 
+use common::boulder;
 use common::rays::Rays;
-use common::scene::{prisms, rock_map, sphere, uniform};
+use common::scene::{prisms, uniform};
 use common::timing::{RayTimes, option};
 use prismarch::embree::{EmbreeOptions, EmbreeTracer};
 use prismarch::prism::{March, SimdLevel};
@@ -27,10 +28,10 @@ struct Contestant {
 const THREADS: [usize; 2] = [1, 2];
 
 fn main() {
-    let map = rock_map(option("--map", 4096), 1);
+    let map = boulder::map(option("--map", 4096));
     let size = option("--size", 1024) as u32;
     let rounds = option("--rounds", 5);
-    let mesh = sphere(3);
+    let mesh = boulder::mesh(8, map.size().0);
 
     let mut contestants = Vec::new();
     let marches = [March::Exact, uniform(1.0), uniform(4.0)];

@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // every program uses a part
 
+pub mod boulder;
 pub mod closed;
 pub mod march;
 pub mod numbers;

@@ -8,12 +8,14 @@ use prismarch::trace::Tracer;
 
 use super::scene::random;
 
-/// Secondary rays start this far along, so that they leave the surface they start on.
-const TNEAR: f32 = 1e-3;
+/// Secondary rays start this far above the surface, about half a texel: so that they leave the surface of every
+/// contestant, tessellations included.
+const LIFT: f32 = 5e-4;
 
 /// Primary rays with the hits' secondary rays; all unit directions.
 pub struct Rays {
-    /// `size` x `size` in tiles of 4 x 2, the tiles row by row: a pinhole camera that the displaced unit sphere fills.
+    /// `size` x `size` in tiles of 4 x 2, these in blocks of 8 x 8, row by row: a pinhole camera that the displaced unit sphere
+    /// fills.
     pub primary: Vec<Ray>,
     /// From every primary hit in a cosine-distributed direction around the geometric normal.
     pub bounce: Vec<Ray>,
@@ -26,7 +28,7 @@ impl Rays {
     ///
     /// # Panics
     ///
-    /// When `size` is not a multiple of 4.
+    /// When `size` is not a multiple of 8.
     pub fn new(size: u32, tracer: &dyn Tracer) -> Self {
         let primary = primary(size);
         let mut bounce = Vec::new();
@@ -41,9 +43,8 @@ impl Rays {
                 -hit.ng
             };
             let from_here = |salt: u32| {
-                let mut ray = Ray::new(ray.at(hit.t), cosine(facing, 4 * index + salt));
-                ray.tnear = TNEAR;
-                ray
+                let start = ray.at(hit.t) + LIFT * facing;
+                Ray::new(start, cosine(facing, 4 * index + salt))
             };
             bounce.push(from_here(0));
             occlusion.push(from_here(2));
@@ -57,20 +58,23 @@ impl Rays {
 }
 
 fn primary(size: u32) -> Vec<Ray> {
-    const EYE: Vec3 = Vec3::new(0.0, -4.0, 1.0);
-    const HALF_WIDTH: f32 = 0.3;
+    const EYE: Vec3 = Vec3::new(0.3, -2.9, 0.8);
+    const HALF_WIDTH: f32 = 0.401;
     let forward = -EYE.normalize();
     let right = forward.cross(Vec3::Z).normalize();
     let up = right.cross(forward);
     let on_film = |i: u32| ((i as f32 + 0.5) / size as f32 * 2.0 - 1.0) * HALF_WIDTH;
     assert!(
-        size.is_multiple_of(4),
-        "{size} pixels are no tiles of 4 x 2"
+        size.is_multiple_of(8),
+        "{size} pixels are no blocks of 8 x 8"
     );
     let pixel = |i: u32| {
-        let (tile, lane) = (i / 8, i % 8);
-        let (x, y) = (tile % (size / 4), tile / (size / 4));
-        (4 * x + lane % 4, 2 * y + lane / 4)
+        let (block, tile, lane) = (i / 64, i / 8 % 8, i % 8);
+        let (x, y) = (block % (size / 8), block / (size / 8));
+        (
+            8 * x + 4 * (tile % 2) + lane % 4,
+            8 * y + 2 * (tile / 2) + lane / 4,
+        )
     };
     (0..size * size)
         .map(|i| {

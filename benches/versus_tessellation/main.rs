@@ -1,6 +1,6 @@
 //! Prisms against tessellations of the same surface under Embree: `cargo bench --bench versus_tessellation`.
 //!
-//! The displaced unit sphere of the other benches (1280 base triangles, a 16-bit map of rock) as prisms, as triangles
+//! The boulder of the other benches (1280 base triangles, a 16-bit map of rock) as prisms, as triangles
 //! with one vertex per texel, and as Embree's grids of the same density. All engines trace the same rays in the
 //! same rounds, one by one and as packets of eight, on one thread and on two. Tessellations get what is fastest for
 //! them: scenes without Embree's robust flag, and a vertex set per base triangle without stitching.
@@ -14,8 +14,9 @@ mod tessellation;
 
 use std::sync::Arc;
 
+use common::boulder;
 use common::rays::{Packets, Rays};
-use common::scene::{displaced, rock_map, sphere};
+use common::scene::displaced;
 use common::timing::{RayTimes, Times, option, word};
 use engines::{BASELINE, ENGINES, Engine};
 use prismarch::embree::{Coherence, Memory, Scene};
@@ -54,11 +55,11 @@ struct Contestant {
 }
 
 fn main() {
-    let map = rock_map(option("--map", 4096), 1);
+    let map = boulder::map(option("--map", 4096));
     let size = option("--size", 1024) as u32;
     let rounds = option("--rounds", 5);
     let only = word("--only").unwrap_or_default();
-    let surface = displaced(&sphere(3), &map);
+    let surface = displaced(&boulder::mesh(8, map.size().0), &map);
 
     let mut contestants: Vec<Contestant> = ENGINES
         .into_iter()
@@ -125,7 +126,8 @@ fn edit_all(surface: &Arc<DisplacedSurface>, contestants: &mut [Contestant]) -> 
     let map = surface.map();
     let (width, height) = map.size();
     let rect = Rect {
-        start: (width / 2, height / 2),
+        // In the middle of a rhombus of the boulder.
+        start: (width * 3 / 8, height * 3 / 8),
         side: 64.min(width / 2).min(height / 2),
     };
     let mut map_times = Times::default();
