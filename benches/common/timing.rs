@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use prismarch::ray::{Ray, RayPacket};
 use prismarch::trace::Tracer;
+use rustix::time::{ClockId, clock_gettime};
 
 use super::rays::{Packets, Rays};
 
@@ -22,12 +23,30 @@ impl Times {
         result
     }
 
+    /// As [`time`](Self::time), for work that `threads` threads do: of one thread its own CPU time, so that other
+    /// programs on the machine are not counted.
+    pub fn time_on(&mut self, threads: usize, work: impl FnOnce() -> usize) {
+        if threads > 1 {
+            self.time(work);
+            return;
+        }
+        let start = thread_seconds();
+        black_box(work());
+        self.0.push(thread_seconds() - start);
+    }
+
     /// The middle of all rounds, seconds; NaN without any.
     pub fn median(&self) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);
         sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
     }
+}
+
+/// CPU time of this thread.
+fn thread_seconds() -> f64 {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 /// How rays are asked.
@@ -114,22 +133,26 @@ impl RayTimes {
     pub fn round(&mut self, tracer: &dyn Tracer, rays: &Rays, threads: usize) {
         let intersect = Query::Intersect;
         self.primary
-            .time(|| trace(tracer, &rays.primary, intersect, threads));
+            .time_on(threads, || trace(tracer, &rays.primary, intersect, threads));
         self.bounce
-            .time(|| trace(tracer, &rays.bounce, intersect, threads));
-        self.occlusion
-            .time(|| trace(tracer, &rays.occlusion, Query::Occluded, threads));
+            .time_on(threads, || trace(tracer, &rays.bounce, intersect, threads));
+        self.occlusion.time_on(threads, || {
+            trace(tracer, &rays.occlusion, Query::Occluded, threads)
+        });
     }
 
     /// One more round of the same rays as packets.
     pub fn round_of_packets(&mut self, tracer: &dyn Tracer, packets: &Packets, threads: usize) {
         let intersect = Query::Intersect;
-        self.primary
-            .time(|| trace_packets(tracer, &packets.primary, intersect, threads));
-        self.bounce
-            .time(|| trace_packets(tracer, &packets.bounce, intersect, threads));
-        self.occlusion
-            .time(|| trace_packets(tracer, &packets.occlusion, Query::Occluded, threads));
+        self.primary.time_on(threads, || {
+            trace_packets(tracer, &packets.primary, intersect, threads)
+        });
+        self.bounce.time_on(threads, || {
+            trace_packets(tracer, &packets.bounce, intersect, threads)
+        });
+        self.occlusion.time_on(threads, || {
+            trace_packets(tracer, &packets.occlusion, Query::Occluded, threads)
+        });
     }
 
     /// Millions of rays per second, median over the rounds: primary, bounce, occlusion.
