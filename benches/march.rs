@@ -1,7 +1,8 @@
 //! Rays per second of the marches under Embree: `cargo bench --bench march`.
 //!
-//! 1280 base triangles on a unit sphere, a 4096x4096 16-bit map of rock, range 0 .. 0.15, 1024x1024 primary rays.
-//! Options after `--`: `--map TEXELS`, `--size PIXELS`, `--rounds N`. Prints a Markdown table.
+//! The boulder of `common/boulder.rs`: 1280 base triangles, a 4096x4096 16-bit map of rock, range 0 .. 0.15, 1024x1024 primary
+//! rays. Options after `--`: `--map TEXELS`, `--cells N` (20 N^2 base triangles), `--size PIXELS`, `--rounds N`. Prints a
+//! Markdown table.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -31,7 +32,7 @@ fn main() {
     let map = boulder::map(option("--map", 4096));
     let size = option("--size", 1024) as u32;
     let rounds = option("--rounds", 5);
-    let mesh = boulder::mesh(8, map.size().0);
+    let mesh = boulder::mesh(option("--cells", 8), map.size().0);
 
     let mut contestants = Vec::new();
     let marches = [March::Exact, uniform(1.0), uniform(4.0)];

@@ -9,8 +9,11 @@ use super::signs::{Side, Signs, TexelLine};
 use crate::prism::curve::Curve;
 use crate::prism::simd::{Grid, LANES, Lanes};
 
+/// Registers of lanes.
+const BATCHES: usize = 2;
+
 /// Most cells of a chord: one lane each.
-pub const MOST_CELLS: f32 = LANES as f32;
+pub const MOST_CELLS: f32 = (BATCHES * LANES) as f32;
 
 /// A chord that is this close to a texel line, in texels, has crossed it: so that a corner between two lanes, each off by a
 /// rounding, is in both rather than in none.
@@ -25,25 +28,42 @@ pub struct Chord {
     pub cells: [[f32; 2]; 2],
     /// The curve's parameter there.
     pub s: [f32; 2],
-    /// How far f may be off, stored texel units.
-    pub off: f32,
+    pub off: Off,
     /// Whether crossings here may be outside the ray's interval.
     pub cut: bool,
 }
 
+/// How far the curve may be from a chord.
+#[derive(Clone, Copy)]
+pub struct Off {
+    /// In x and in y, texels.
+    pub place: f32,
+    /// In h, stored texel units.
+    pub height: f32,
+    /// Largest minus smallest stored texel of all cells around.
+    pub range: f32,
+}
+
+/// One number for every lane of every batch.
+type Row = [[f32; LANES]; BATCHES];
+
 /// The lanes' cells and quadratics.
 struct Cells {
     /// Column and row, relative to the chord's first cell.
-    column: [f32; LANES],
-    row: [f32; LANES],
+    column: Row,
+    row: Row,
     /// The chord's parameter where the lane begins, and how far it goes.
-    start: [f32; LANES],
-    length: [f32; LANES],
+    start: Row,
+    length: Row,
     /// f over the lane's own parameter in [0, 1].
-    f: [[f32; LANES]; 3],
+    f: [Row; 3],
+    /// How far f may be off.
+    off: Row,
     /// Lanes that begin at an x line.
     at_x: f32,
 }
+
+const ZEROS: Row = [[0.0; LANES]; BATCHES];
 
 impl Chord {
     /// Reports the cells that may be crossed.
@@ -74,67 +94,106 @@ impl Chord {
         // The line of its cell through which the chord leaves: the right and upper one, or the left and lower one.
         let (ahead_x, ahead_y) = (step_x.max(0.0), step_y.max(0.0));
 
+        let count = nx + ny + 1.0;
+        let held = grid.holds([i0 + base[0], j0 + base[1]], [i1 + base[0], j1 + base[1]]);
+        let mut cells = Cells {
+            column: ZEROS,
+            row: ZEROS,
+            start: ZEROS,
+            length: ZEROS,
+            f: [ZEROS; 3],
+            off: ZEROS,
+            at_x: nx,
+        };
+        let mut possible = 0;
         let zero = L::splat(0.0);
         let one = L::splat(1.0);
-        let numbers = L::from_array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
-        // Lanes 1 to nx: crossings of x lines; then ny crossings of y lines.
-        let line_x = numbers.mul_add(L::splat(step_x), L::splat(ahead_x - step_x));
-        let line_y = (numbers - L::splat(nx)).mul_add(L::splat(step_y), L::splat(ahead_y - step_y));
-        let by_x = (line_x - L::splat(x0)) * L::splat(per_x);
-        let by_y = (line_y - L::splat(y0)) * L::splat(per_y);
-        let at_x_line = numbers - L::splat(nx + 0.5);
-        let begins = at_x_line.select_negative(by_x, by_y);
-        let start = (numbers - L::splat(0.5)).select_negative(zero, begins);
+        // The chord is off by as much, and a cell may be taken for its neighbour within `NUDGE`.
+        let near = self.off.place + NUDGE;
+        for batch in 0..BATCHES {
+            let first = (batch * LANES) as f32;
+            if first >= count {
+                break;
+            }
+            let numbers = L::from_array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]) + L::splat(first);
+            // Lanes 1 to nx: crossings of x lines; then ny crossings of y lines.
+            let line_x = numbers.mul_add(L::splat(step_x), L::splat(ahead_x - step_x));
+            let line_y =
+                (numbers - L::splat(nx)).mul_add(L::splat(step_y), L::splat(ahead_y - step_y));
+            let by_x = (line_x - L::splat(x0)) * L::splat(per_x);
+            let by_y = (line_y - L::splat(y0)) * L::splat(per_y);
+            let at_x_line = numbers - L::splat(nx + 0.5);
+            let begins = at_x_line.select_negative(by_x, by_y);
+            let is_first = numbers - L::splat(0.5);
+            let start = is_first.select_negative(zero, begins);
 
-        let x = start.mul_add(L::splat(dx), L::splat(x0));
-        let y = start.mul_add(L::splat(dy), L::splat(y0));
-        let i = (x + L::splat(step_x * NUDGE)).floor();
-        let j = (y + L::splat(step_y * NUDGE)).floor();
-        let leaves_x = (i + L::splat(ahead_x) - L::splat(x0)) * L::splat(per_x);
-        let leaves_y = (j + L::splat(ahead_y) - L::splat(y0)) * L::splat(per_y);
-        let end = leaves_x.min(leaves_y).min(one);
-        let length = (end - start).max(zero);
+            let x = start.mul_add(L::splat(dx), L::splat(x0));
+            let y = start.mul_add(L::splat(dy), L::splat(y0));
+            let i = (x + L::splat(step_x * NUDGE)).floor();
+            let j = (y + L::splat(step_y * NUDGE)).floor();
+            let leaves_x = (i + L::splat(ahead_x) - L::splat(x0)) * L::splat(per_x);
+            let leaves_y = (j + L::splat(ahead_y) - L::splat(y0)) * L::splat(per_y);
+            let leaves = leaves_x.min(leaves_y);
+            let length = (leaves.min(one) - start).max(zero);
 
-        let (i0, j0) = (i0 + base[0], j0 + base[1]);
-        let (column, row) = (i + L::splat(i0), j + L::splat(j0));
-        let [h00, h10, h01, h11] = if grid.holds([i0, j0], [i1 + base[0], j1 + base[1]]) {
-            L::cell_corners(grid, column, row)
-        } else {
-            grid.corners(column, row)
-        };
-        let (bottom, left) = (h10 - h00, h01 - h00);
-        let twist = (h11 - h01) - bottom;
-        let (fx, fy) = (x - i, y - j);
-        let slope_x = twist.mul_add(fy, bottom);
-        let slope_y = twist.mul_add(fx, left);
-        let surface = fy.mul_add(left, fx.mul_add(slope_x, h00));
-        let f0 = start.mul_add(L::splat(dh), L::splat(h0)) - surface;
-        let (mx, my) = (length * L::splat(dx), length * L::splat(dy));
-        let f1 = slope_y.neg_mul_add(my, slope_x.neg_mul_add(mx, length * L::splat(dh)));
-        let f2 = (twist * mx).neg_mul_add(my, zero);
+            let (column, row) = (i + L::splat(i0 + base[0]), j + L::splat(j0 + base[1]));
+            let [h00, h10, h01, h11] = if held {
+                L::cell_corners(grid, column, row)
+            } else {
+                grid.corners(column, row)
+            };
+            let (bottom, left) = (h10 - h00, h01 - h00);
+            let twist = (h11 - h01) - bottom;
+            let (fx, fy) = (x - i, y - j);
+            let slope_x = twist.mul_add(fy, bottom);
+            let slope_y = twist.mul_add(fx, left);
+            let surface = fy.mul_add(left, fx.mul_add(slope_x, h00));
+            let f0 = start.mul_add(L::splat(dh), L::splat(h0)) - surface;
+            let (mx, my) = (length * L::splat(dx), length * L::splat(dy));
+            let f1 = slope_y.neg_mul_add(my, slope_x.neg_mul_add(mx, length * L::splat(dh)));
+            let f2 = (twist * mx).neg_mul_add(my, zero);
 
-        // With the sign at the start made positive: can f come within `off` of 0?
-        let g0 = f0.abs() - L::splat(self.off);
-        let g1 = f0.select_negative(zero - f1, f1);
-        let g2 = f0.select_negative(zero - f2, f2);
-        let at_end = g0 + g1 + g2;
-        let discriminant = (g0 * L::splat(4.0)).neg_mul_add(g2, g1 * g1);
-        let crosses = g0.sign_mask() | at_end.sign_mask();
-        // The parabola turns between the ends, upward, and has a root.
-        let turns = g1.sign_mask() & !(g1 + g2 + g2).sign_mask() & !discriminant.sign_mask();
-        let used = (1u32 << (nx + ny + 1.0) as u32) - 1;
-        let possible = (crosses | turns) & used;
+            // Where the chord passes a corner of its cell closely the curve may touch cells of which no lane knows.
+            let (gone_x, gone_y) = (fx + mx, fy + my);
+            let (apart_x, apart_y) = (fx.min(one - fx), fy.min(one - fy));
+            let begin = at_x_line.select_negative(apart_y, apart_x);
+            let begin = is_first.select_negative(apart_x.min(apart_y), begin);
+            let (apart_x, apart_y) = (gone_x.min(one - gone_x), gone_y.min(one - gone_y));
+            let end = (leaves_x - leaves_y).select_negative(apart_y, apart_x);
+            let end = (leaves - one).select_negative(end, apart_x.min(apart_y));
+            let steepest =
+                bottom.abs().max((bottom + twist).abs()) + left.abs().max((left + twist).abs());
+            let off = steepest.mul_add(L::splat(near), L::splat(self.off.height));
+            let wide = 2.0 * near * self.off.range + self.off.height;
+            let off = (begin.min(end) - L::splat(2.0 * near)).select_negative(L::splat(wide), off);
+
+            // With the sign at the start made positive: can f come within `off` of 0?
+            let g0 = f0.abs() - off;
+            let g1 = f0.select_negative(zero - f1, f1);
+            let g2 = f0.select_negative(zero - f2, f2);
+            let at_end = g0 + g1 + g2;
+            let discriminant = (g0 * L::splat(4.0)).neg_mul_add(g2, g1 * g1);
+            let crosses = g0.sign_mask() | at_end.sign_mask();
+            // The parabola turns between the ends, upward, and has a root.
+            let turns = g1.sign_mask() & !(g1 + g2 + g2).sign_mask() & !discriminant.sign_mask();
+            let used = (numbers - L::splat(count - 0.5)).sign_mask();
+            let found = (crosses | turns) & used;
+            if found == 0 {
+                continue;
+            }
+            possible |= found << (batch * LANES);
+            cells.column[batch] = i.to_array();
+            cells.row[batch] = j.to_array();
+            cells.start[batch] = start.to_array();
+            cells.length[batch] = length.to_array();
+            cells.f[0][batch] = f0.to_array();
+            cells.f[1][batch] = f1.to_array();
+            cells.f[2][batch] = f2.to_array();
+            cells.off[batch] = off.to_array();
+        }
         if possible == 0 {
             return;
         }
-        let cells = Cells {
-            column: i.to_array(),
-            row: j.to_array(),
-            start: start.to_array(),
-            length: length.to_array(),
-            f: [f0.to_array(), f1.to_array(), f2.to_array()],
-            at_x: nx,
-        };
         self.report::<L>(possible, &cells, curve, signs);
     }
 
@@ -151,13 +210,17 @@ impl Chord {
         while possible != 0 {
             let lane = first(possible, &cells.start);
             possible &= !(1 << lane);
-            let (start, length) = (cells.start[lane], cells.length[lane]);
-            let [f0, f1, f2] = [cells.f[0][lane], cells.f[1][lane], cells.f[2][lane]];
+            let (start, length) = (of(&cells.start, lane), of(&cells.length, lane));
+            let [f0, f1, f2] = [
+                of(&cells.f[0], lane),
+                of(&cells.f[1], lane),
+                of(&cells.f[2], lane),
+            ];
             let end = f0 + f1 + f2;
             // Signs at both ends that differ by more than f may be off: one crossing, whatever else. In all other lanes
             // f64 looks: where the chord passes the texel lines, since what is proven of lanes is proven up to there,
             // and where the curve does, since there are the crests.
-            let sure = |f: f32| f.abs() > self.off;
+            let sure = |f: f32| f.abs() > of(&cells.off, lane);
             let certain = sure(f0) && sure(end) && (f0 > 0.0) != (end > 0.0);
             let (from, to) = (s(start), s(start + length));
             // Between the last point and this lane nothing is crossed: only the first lane needs its beginning.
@@ -237,9 +300,9 @@ impl Chord {
     #[inline(always)]
     fn line(&self, cells: &Cells, lane: usize, axis: usize, end: f32) -> TexelLine {
         let cell = if axis == 0 {
-            cells.column[lane]
+            of(&cells.column, lane)
         } else {
-            cells.row[lane]
+            of(&cells.row, lane)
         };
         let forward = (self.to[axis] - self.from[axis]).is_sign_positive();
         let offset = if forward { end } else { 1.0 - end };
@@ -250,15 +313,20 @@ impl Chord {
     }
 }
 
+#[inline(always)]
+fn of(row: &Row, lane: usize) -> f32 {
+    row.as_flattened()[lane % (BATCHES * LANES)]
+}
+
 /// The lane among `possible` that begins first.
 #[inline(always)]
-fn first(possible: u32, start: &[f32; LANES]) -> usize {
+fn first(possible: u32, start: &Row) -> usize {
     let mut best = possible.trailing_zeros() as usize;
     let mut rest = possible & (possible - 1);
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize;
         rest &= rest - 1;
-        if start[lane] < start[best] {
+        if of(start, lane) < of(start, best) {
             best = lane;
         }
     }

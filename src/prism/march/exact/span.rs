@@ -15,14 +15,14 @@
 use glam::{Vec3, Vec4};
 
 use super::Problem;
-use super::cells::{Chord, MOST_CELLS, NUDGE};
+use super::cells::{Chord, MOST_CELLS, Off};
 use super::children::{Ends, Stack, at, of};
 use super::signs::{Side, Signs};
 use crate::prism::curve::{Curve, View};
 use crate::prism::simd::{Grid, Lanes, Quad, Task};
 
 /// A chord this close to the curve, in texels, may be walked cell by cell.
-const CLOSE: f32 = 1.0 / 256.0;
+const CLOSE: f32 = 1.0 / 64.0;
 
 /// Texels beyond which a span has 15 children.
 const WIDE: f32 = 10.0;
@@ -372,10 +372,9 @@ impl<'a, L: Lanes> Walker<'a, L> {
                 length = longer;
                 last += 1;
             }
-            let off = bounds.bend * length * length + bounds.rounding;
-            let mut slope = 0.0f32;
+            let mut range = 0.0f32;
             for k in first..last {
-                slope = slope.max(of(&ends.range, k));
+                range = range.max(of(&ends.range, k));
             }
             let chord = Chord {
                 from: ends.point(first),
@@ -385,10 +384,11 @@ impl<'a, L: Lanes> Walker<'a, L> {
                     at(span, first, ends.children),
                     at(span, last, ends.children),
                 ],
-                // (x, y) off by `off` and a cell taken for its neighbour within `NUDGE` change the surface by at most this.
-                off: bounds.height_bend * length * length
-                    + bounds.height_rounding
-                    + 2.0 * (off + NUDGE) * slope,
+                off: Off {
+                    place: bounds.bend * length * length + bounds.rounding,
+                    height: bounds.height_bend * length * length + bounds.height_rounding,
+                    range,
+                },
                 cut: self.cut,
             };
             chord.walk::<L>(&self.grid, self.base, self.curve, signs);
