@@ -221,6 +221,36 @@ impl Cluster {
         [texel(s0), texel(s1), texel(s2)]
     }
 
+    /// The first of these.
+    #[inline(always)]
+    pub fn first_texel(&self, lane: usize, map: &DisplacementMap) -> DVec2 {
+        let [s, t] = &self.texcoords[0];
+        map.to_texel(DVec2::new(s[lane].into(), t[lane].into()))
+    }
+
+    /// Texture coordinates of all lanes, by corner and axis.
+    #[inline(always)]
+    pub fn texcoord_lanes<L: Lanes>(&self) -> [[L; 2]; 3] {
+        let [s0, s1, s2] = &self.texcoords;
+        [
+            [L::from_array(s0[0]), L::from_array(s0[1])],
+            [L::from_array(s1[0]), L::from_array(s1[1])],
+            [L::from_array(s2[0]), L::from_array(s2[1])],
+        ]
+    }
+
+    /// A depth along an axis that no prism is far from.
+    #[inline(always)]
+    pub fn anchor(&self, axis: usize) -> f32 {
+        self.vertices[0][axis][0]
+    }
+
+    /// The lanes in which t is not monotone in w.
+    #[inline(always)]
+    pub fn folded<L: Lanes>(&self) -> u32 {
+        L::from_bits(&self.prims).sign_mask()
+    }
+
     /// One prism in f64.
     #[inline(always)]
     pub fn patch<'m>(&self, lane: usize, surface: &'m DisplacedSurface) -> Patch<'m> {

@@ -383,6 +383,17 @@ impl<Q: Quad> Curve<Q> {
         } else {
             [stretch.w[1], stretch.w[0]]
         };
+        Self::between(view, texels, [from, to], frame.per_depth)
+    }
+
+    /// The curve over [from, to] of w, which is in the order of t.
+    #[inline(always)]
+    pub fn between(
+        view: &View<Q>,
+        texels: &[DVec2; 3],
+        [from, to]: [f64; 2],
+        per_depth: f64,
+    ) -> Self {
         let span = to - from;
         let (start, change) = (Q::splat(from), Q::splat(span));
         let areas = stretched(&view.areas, start, change);
@@ -420,7 +431,7 @@ impl<Q: Quad> Curve<Q> {
             depth: [depth[0] * unit, depth[1] * unit, depth[2] * unit],
             w: [from, span],
             texel_base: base.to_array(),
-            per_depth: frame.per_depth,
+            per_depth,
         }
     }
 

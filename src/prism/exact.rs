@@ -1,10 +1,12 @@
 //! Prisms for the exact march: clusters of eight, and the hit test of one cluster.
 
 use super::cluster::{Cluster, MOST_PRISMS, groups};
-use super::cull::Pairs;
 use super::edits::EditBounds;
-use super::march::exact::{Found, Problem, root, search, walls};
-use super::ray_frame::{RayFrame, RayLanes, axes};
+use super::march::exact::{
+    Arcs, Found, FoundArcs, Problem, Search, Units, root, search_arc, walls,
+};
+use super::ray_frame::{Anchored, RayFrame, axes};
+use super::sight::Sight;
 use super::simd::{LANES, Lanes};
 use super::{MarchError, Parts, PrismHit, Prisms};
 use crate::ray::Ray;
@@ -49,25 +51,91 @@ impl ExactPrisms {
     }
 }
 
+/// A cluster that a ray may meet.
+struct Meeting<'a> {
+    prisms: &'a Prisms,
+    cluster: &'a Cluster,
+    frame: RayFrame,
+    ray: Anchored,
+    arcs: Arcs,
+    found: FoundArcs,
+}
+
+impl<'a> Meeting<'a> {
+    /// `None` where the ray meets no prism of it.
+    #[inline(always)]
+    fn new<L: Lanes>(prisms: &'a Prisms, index: u32, ray: &Ray) -> Option<Self> {
+        let Parts::Exact(exact) = &prisms.parts else {
+            return None;
+        };
+        let cluster = &exact.clusters[index as usize];
+        let frame = RayFrame::new(ray, axes(ray));
+        let ray = frame.anchored(cluster.anchor(frame.axes[2]), ray);
+        let (sight, met) = Sight::<L>::new(cluster, &ray);
+        let met = met & ((1 << exact.len(index as usize)) - 1);
+        if met == 0 {
+            return None;
+        }
+        let (_, normals, _) = cluster.lanes::<L>(ray.axes);
+        let units = Units::new(&prisms.surface);
+        let (arcs, found) =
+            Arcs::seen(&sight, met, cluster.texcoord_lanes(), normals, &units, &ray);
+        let others = if ray.is_usual {
+            found.others | met & cluster.folded::<L>()
+        } else {
+            met
+        };
+        Some(Self {
+            prisms,
+            cluster,
+            frame,
+            ray,
+            arcs,
+            found: FoundArcs {
+                arcs: found.arcs & !others,
+                others,
+            },
+        })
+    }
+
+    /// The first crossing in a prism, or any.
+    #[inline(always)]
+    fn search<L: Lanes>(&self, problem: &Problem<'_>) -> Option<Found> {
+        if self.found.arcs >> problem.lane & 1 != 0 {
+            search_arc::<L>(problem, &self.frame, &self.arcs, self.ray.time)
+        } else {
+            L::outline(Search {
+                problem,
+                frame: &self.frame,
+            })
+        }
+    }
+
+    #[inline(always)]
+    fn problem(&self, lane: usize, interval: [f32; 2], any: bool) -> Problem<'_> {
+        Problem {
+            surface: &self.prisms.surface,
+            cluster: self.cluster,
+            lane,
+            any,
+            interval,
+        }
+    }
+}
+
 /// The first hit on a cluster.
 #[inline(always)]
 pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<PrismHit> {
-    let Parts::Exact(exact) = &prisms.parts else {
-        return None;
-    };
-    let (cluster, axes) = (&exact.clusters[index as usize], axes(ray));
-    let mut alive = meeting::<L>(cluster, ray, axes) & ((1 << exact.len(index as usize)) - 1);
-    if alive == 0 {
-        return None;
-    }
-    let frame = RayFrame::new(ray, axes);
+    let meeting = Meeting::new::<L>(prisms, index, ray)?;
+    let cluster = meeting.cluster;
     let mut interval = [ray.tnear, ray.tfar];
     let mut nearest: Option<(Found, usize)> = None;
     let mut wall: Option<PrismHit> = None;
+    let mut alive = meeting.found.arcs | meeting.found.others;
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
-        if let Some(found) = search::<L>(&prisms.problem(cluster, lane, interval, false), &frame) {
+        if let Some(found) = meeting.search::<L>(&meeting.problem(lane, interval, false)) {
             // Of two at the same t the lower base triangle, whatever the order of the lanes.
             let beats = nearest.is_none_or(|(best, of)| {
                 let (new, old) = (found.t as f32, best.t as f32);
@@ -79,7 +147,7 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
             }
         }
         if cluster.walls(lane) != 0
-            && let Some(found) = walls::<L>(&prisms.problem(cluster, lane, interval, false), &frame)
+            && let Some(found) = walls::<L>(&meeting.problem(lane, interval, false), &meeting.frame)
             && wall.is_none_or(|best| found.is_before(&best))
         {
             wall = Some(found);
@@ -93,63 +161,26 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
         return Some(wall);
     }
     let (found, lane) = nearest?;
-    let problem = prisms.problem(cluster, lane, interval, false);
+    let problem = meeting.problem(lane, interval, false);
     Some(root::<L>(&problem, &found).to_hit(cluster.prim(lane)))
 }
 
 /// Whether a cluster is hit at all.
 #[inline(always)]
 pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
-    let Parts::Exact(exact) = &prisms.parts else {
+    let Some(meeting) = Meeting::new::<L>(prisms, index, ray) else {
         return false;
     };
-    let (cluster, axes) = (&exact.clusters[index as usize], axes(ray));
-    let mut alive = meeting::<L>(cluster, ray, axes) & ((1 << exact.len(index as usize)) - 1);
-    if alive == 0 {
-        return false;
-    }
-    let frame = RayFrame::new(ray, axes);
+    let mut alive = meeting.found.arcs | meeting.found.others;
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
-        let problem = prisms.problem(cluster, lane, [ray.tnear, ray.tfar], true);
-        if search::<L>(&problem, &frame).is_some()
-            || cluster.walls(lane) != 0 && walls::<L>(&problem, &frame).is_some()
+        let problem = meeting.problem(lane, [ray.tnear, ray.tfar], true);
+        if meeting.search::<L>(&problem).is_some()
+            || meeting.cluster.walls(lane) != 0 && walls::<L>(&problem, &meeting.frame).is_some()
         {
             return true;
         }
     }
     false
-}
-
-/// The lanes whose prisms the ray may meet.
-#[inline(always)]
-fn meeting<L: Lanes>(cluster: &Cluster, ray: &Ray, axes: [usize; 3]) -> u32 {
-    let (vertices, normals, offsets) = cluster.lanes::<L>(axes);
-    Pairs {
-        vertices,
-        normals,
-        offsets,
-        ray: RayLanes::splat(ray, axes),
-    }
-    .may_meet()
-}
-
-impl Prisms {
-    #[inline(always)]
-    fn problem<'a>(
-        &'a self,
-        cluster: &'a Cluster,
-        lane: usize,
-        interval: [f32; 2],
-        any: bool,
-    ) -> Problem<'a> {
-        Problem {
-            surface: &self.surface,
-            cluster,
-            lane,
-            any,
-            interval,
-        }
-    }
 }

@@ -8,7 +8,6 @@
 //! surface's definition ([`crate::surface`]). This room knows no Embree, no scene and no picture.
 
 mod cluster;
-mod cull;
 mod curve;
 mod edits;
 mod exact;
@@ -22,6 +21,7 @@ mod ray_frame;
 #[cfg(test)]
 mod seam_tests;
 mod sides;
+mod sight;
 mod simd;
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,6 @@
 //! lateral coordinates 0; so a point's projection depends on the point and the ray alone, and two prisms see
 //! the same digits of a vertex that they share.
 
-use super::simd::Lanes;
 use crate::ray::Ray;
 
 /// The main axis of a ray, last, and the two others: a cyclic permutation of x, y, z.
@@ -52,58 +51,67 @@ impl RayFrame {
     }
 }
 
-/// The same in f32, for culling: one ray in all lanes, or eight that have the same axes.
-pub struct RayLanes<L> {
-    /// Origin along the axes.
-    pub origin: [L; 3],
+/// The same in f32, from a point of the ray near what is looked at, so that no digits go to the way there.
+pub struct Anchored {
+    /// Lateral axes, then the main axis.
+    pub axes: [usize; 3],
+    /// The anchor along the main axis.
+    pub depth: f32,
+    /// The anchor along the lateral axes: rounded, and what rounding left.
+    pub near: [f32; 2],
+    pub rest: [f32; 2],
     /// Movement along the lateral axes per unit along the main axis.
-    pub shear: [L; 2],
+    pub shear: [f32; 2],
     /// Ray parameter per unit along the main axis.
-    pub per_depth: L,
-    /// tnear and tfar.
-    pub interval: [L; 2],
+    pub per_depth: f32,
+    /// Ray parameter at the anchor.
+    pub time: f64,
+    /// tnear and tfar from there, not narrower.
+    pub interval: [f32; 2],
+    /// Whether ray parameters are within f32's range; where not, `interval` is all of space.
+    pub is_usual: bool,
 }
 
 /// Directions beyond this and its inverse would overflow ray parameters in f32.
-const LONGEST: f32 = 1e12;
+const LONGEST: f64 = 1e12;
 
-impl<L: Lanes> RayLanes<L> {
-    /// One ray in all lanes.
+impl RayFrame {
+    /// The frame from the ray's point at `depth` along the main axis.
     #[inline(always)]
-    pub fn splat(ray: &Ray, [x, y, z]: [usize; 3]) -> Self {
-        let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
-        Self {
-            origin: [
-                L::splat(origin[x]),
-                L::splat(origin[y]),
-                L::splat(origin[z]),
+    pub fn anchored(&self, depth: f32, ray: &Ray) -> Anchored {
+        let beyond = f64::from(depth) - self.origin[2];
+        let (x, y) = (
+            self.origin[0] + beyond * self.shear[0],
+            self.origin[1] + beyond * self.shear[1],
+        );
+        let near = [x as f32, y as f32];
+        let length = self.per_depth.abs();
+        let is_usual = length < LONGEST && length > 1.0 / LONGEST;
+        let time = beyond * self.per_depth;
+        let (tnear, tfar) = (
+            (f64::from(ray.tnear) - time) as f32,
+            (f64::from(ray.tfar) - time) as f32,
+        );
+        Anchored {
+            axes: self.axes,
+            depth,
+            near,
+            rest: [
+                (x - f64::from(near[0])) as f32,
+                (y - f64::from(near[1])) as f32,
             ],
-            ..Self::directed(
+            shear: [self.shear[0] as f32, self.shear[1] as f32],
+            per_depth: if is_usual { self.per_depth as f32 } else { 1.0 },
+            time,
+            interval: if is_usual {
                 [
-                    L::splat(direction[x]),
-                    L::splat(direction[y]),
-                    L::splat(direction[z]),
-                ],
-                [L::splat(ray.tnear), L::splat(ray.tfar)],
-            )
-        }
-    }
-
-    /// With its origin still to come.
-    #[inline(always)]
-    fn directed([x, y, z]: [L; 3], [tnear, tfar]: [L; 2]) -> Self {
-        let per_depth = L::splat(1.0) / z;
-        // All of space where ray parameters would overflow.
-        let length = z.abs();
-        let usual = (L::splat(LONGEST) - length).min(length - L::splat(1.0 / LONGEST));
-        Self {
-            origin: [x, y, z],
-            shear: [x * per_depth, y * per_depth],
-            per_depth: usual.select_negative(L::splat(1.0), per_depth),
-            interval: [
-                usual.select_negative(L::splat(f32::NEG_INFINITY), tnear),
-                usual.select_negative(L::splat(f32::INFINITY), tfar),
-            ],
+                    tnear - tnear.abs() * f32::EPSILON,
+                    tfar + tfar.abs() * f32::EPSILON,
+                ]
+            } else {
+                [f32::NEG_INFINITY, f32::INFINITY]
+            },
+            is_usual,
         }
     }
 }

@@ -3,10 +3,10 @@
 //! Along a chord (x, y, h) is linear, and in one cell the surface is bilinear in (x, y): f = h - D is a quadratic in the
 //! chord's parameter. Lane 0 is the cell in which the chord starts; every other lane is the cell entered by one crossing of a
 //! texel line, in no order: it leaves at the next line. A lane in which |f| provably stays above what the chord may be
-//! off is done with; the others are reported in order, with both ends and the turning point between.
+//! off is done with; f64 looks at the others, in order.
 
-use super::signs::{Side, Signs, TexelLine};
-use crate::prism::curve::Curve;
+use super::signs::{Side, Signs};
+use super::span::Walker;
 use crate::prism::simd::{Grid, LANES, Lanes};
 
 /// Registers of lanes.
@@ -29,8 +29,6 @@ pub struct Chord {
     /// The curve's parameter there.
     pub s: [f32; 2],
     pub off: Off,
-    /// Whether crossings here may be outside the ray's interval.
-    pub cut: bool,
 }
 
 /// How far the curve may be from a chord.
@@ -47,11 +45,8 @@ pub struct Off {
 /// One number for every lane of every batch.
 type Row = [[f32; LANES]; BATCHES];
 
-/// The lanes' cells and quadratics.
+/// The lanes' stretches and quadratics.
 struct Cells {
-    /// Column and row, relative to the chord's first cell.
-    column: Row,
-    row: Row,
     /// The chord's parameter where the lane begins, and how far it goes.
     start: Row,
     length: Row,
@@ -59,8 +54,6 @@ struct Cells {
     f: [Row; 3],
     /// How far f may be off.
     off: Row,
-    /// Lanes that begin at an x line.
-    at_x: f32,
 }
 
 const ZEROS: Row = [[0.0; LANES]; BATCHES];
@@ -72,8 +65,8 @@ impl Chord {
         &self,
         grid: &Grid<'_>,
         base: [f32; 2],
-        curve: &Curve<L::Quad>,
-        signs: &mut Signs<'_>,
+        walker: &Walker<'_>,
+        signs: &mut Signs<'_, L::Quad>,
     ) {
         let [x0, y0, h0] = self.from;
         let [x1, y1, h1] = self.to;
@@ -97,13 +90,10 @@ impl Chord {
         let count = nx + ny + 1.0;
         let held = grid.holds([i0 + base[0], j0 + base[1]], [i1 + base[0], j1 + base[1]]);
         let mut cells = Cells {
-            column: ZEROS,
-            row: ZEROS,
             start: ZEROS,
             length: ZEROS,
             f: [ZEROS; 3],
             off: ZEROS,
-            at_x: nx,
         };
         let mut possible = 0;
         let zero = L::splat(0.0);
@@ -182,8 +172,6 @@ impl Chord {
                 continue;
             }
             possible |= found << (batch * LANES);
-            cells.column[batch] = i.to_array();
-            cells.row[batch] = j.to_array();
             cells.start[batch] = start.to_array();
             cells.length[batch] = length.to_array();
             cells.f[0][batch] = f0.to_array();
@@ -194,7 +182,7 @@ impl Chord {
         if possible == 0 {
             return;
         }
-        self.report::<L>(possible, &cells, curve, signs);
+        self.report::<L>(possible, &cells, walker, signs);
     }
 
     #[inline(always)]
@@ -202,8 +190,8 @@ impl Chord {
         &self,
         mut possible: u32,
         cells: &Cells,
-        curve: &Curve<L::Quad>,
-        signs: &mut Signs<'_>,
+        walker: &Walker<'_>,
+        signs: &mut Signs<'_, L::Quad>,
     ) {
         let (s0, s1) = (f64::from(self.s[0]), f64::from(self.s[1]));
         let s = |tau: f32| s0 + f64::from(tau).clamp(0.0, 1.0) * (s1 - s0);
@@ -218,97 +206,28 @@ impl Chord {
             ];
             let end = f0 + f1 + f2;
             // Signs at both ends that differ by more than f may be off: one crossing, whatever else. In all other lanes
-            // f64 looks: where the chord passes the texel lines, since what is proven of lanes is proven up to there,
-            // and where the curve does, since there are the crests.
+            // f64 looks, from where the lane begins to where it ends: what is proven of lanes is proven up to there.
             let sure = |f: f32| f.abs() > of(&cells.off, lane);
             let certain = sure(f0) && sure(end) && (f0 > 0.0) != (end > 0.0);
             let (from, to) = (s(start), s(start + length));
+            if certain && signs.any_will_do() && walker.is_surely_within(from as f32, to as f32) {
+                return signs.found_any();
+            }
             // Between the last point and this lane nothing is crossed: only the first lane needs its beginning.
             if signs.is_fresh() {
-                let side = if certain {
-                    Side::of(f0)
-                } else {
-                    Side::Unknown(None)
-                };
-                let begin = signs.look::<L>(curve, from, side);
-                signs.point::<L>(curve, begin, from);
+                let side = if certain { Side::of(f0) } else { Side::Unknown };
+                let begin = signs.look::<L>(from, side);
+                signs.point::<L>(begin, from);
             }
             let root = s(start + length * root(f0, f1, f2));
             if certain {
-                if !self.cut && signs.any_will_do() {
-                    return signs.found_any();
-                }
-                signs.point::<L>(curve, (to, end > 0.0), root);
+                signs.point::<L>((to, end > 0.0), root);
             } else {
-                let lines = [self.begin_line(cells, lane), self.end_line(cells, lane)];
-                self.look_closely::<L>([from, to], lines, root, curve, signs);
+                signs.look_closely::<L>([from, to], root);
             }
             if signs.is_done() {
                 return;
             }
-        }
-    }
-
-    /// All points of a lane of which f32 knows too little.
-    #[inline(always)]
-    fn look_closely<L: Lanes>(
-        &self,
-        [from, to]: [f64; 2],
-        lines: [Option<TexelLine>; 2],
-        root: f64,
-        curve: &Curve<L::Quad>,
-        signs: &mut Signs<'_>,
-    ) {
-        if lines[0].is_some() {
-            let begin = signs.look::<L>(curve, from, Side::Unknown(lines[0]));
-            signs.point::<L>(curve, begin, begin.0);
-        }
-        let after = signs.look::<L>(curve, to, Side::Unknown(lines[1]));
-        if signs.is_above() == Some(after.1)
-            && let Some(dip) = signs.dip::<L>(curve, [from, to], lines, after.1)
-        {
-            signs.point::<L>(curve, (dip, !after.1), dip);
-        }
-        signs.point::<L>(curve, after, root);
-        if lines[1].is_some() && to > after.0 {
-            let beyond = signs.look::<L>(curve, to, Side::Unknown(None));
-            signs.point::<L>(curve, beyond, to);
-        }
-    }
-
-    /// The texel line at which a lane begins; lane 0 begins where the chord does.
-    #[inline(always)]
-    fn begin_line(&self, cells: &Cells, lane: usize) -> Option<TexelLine> {
-        let axis = usize::from(lane as f32 > cells.at_x);
-        (lane > 0).then(|| self.line(cells, lane, axis, 0.0))
-    }
-
-    /// The texel line at which a lane ends, if the chord goes on.
-    #[inline(always)]
-    fn end_line(&self, cells: &Cells, lane: usize) -> Option<TexelLine> {
-        let leaves = |axis: usize| {
-            let line = self.line(cells, lane, axis, 1.0).at as f32;
-            (line - self.from[axis]) / (self.to[axis] - self.from[axis])
-        };
-        let (x, y) = (leaves(0), leaves(1));
-        // Along y, x is infinite or no number.
-        let axis = if x <= y { 0 } else { 1 };
-        (x.min(y) < 1.0).then(|| self.line(cells, lane, axis, 1.0))
-    }
-
-    /// The line through which a lane enters its cell (0) or leaves it (1).
-    #[inline(always)]
-    fn line(&self, cells: &Cells, lane: usize, axis: usize, end: f32) -> TexelLine {
-        let cell = if axis == 0 {
-            of(&cells.column, lane)
-        } else {
-            of(&cells.row, lane)
-        };
-        let forward = (self.to[axis] - self.from[axis]).is_sign_positive();
-        let offset = if forward { end } else { 1.0 - end };
-        TexelLine {
-            axis,
-            at: f64::from(self.cells[0][axis]) + f64::from(cell + offset),
         }
     }
 }

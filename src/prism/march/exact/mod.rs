@@ -8,6 +8,7 @@
 //! g(s) = w |N'| - D at the ends of what is left say where a root is, and a bracketed Newton iteration finds it. So a spike one texel wide
 //! is found, and the number of crossings in a prism has the parity of the signs at its ends, which neighbours share.
 
+mod arcs;
 mod cells;
 mod children;
 mod pieces;
@@ -21,6 +22,7 @@ use crate::prism::curve::{Curve, Cut, Stretch, View};
 use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::{Lanes, Quad, Task};
 use crate::surface::{DisplacedSurface, Patch};
+pub use arcs::{Arcs, Found as FoundArcs, Units};
 use pieces::Piece;
 use signs::Signs;
 use span::Walker;
@@ -69,9 +71,43 @@ pub struct Found {
     pub v: f64,
 }
 
-/// The first crossing inside a prism, or any.
+/// The first crossing on an arc that f32 set up, or any.
 #[inline(always)]
-pub fn search<L: Lanes>(problem: &Problem<'_>, frame: &RayFrame) -> Option<Found> {
+pub fn search_arc<L: Lanes>(
+    problem: &Problem<'_>,
+    frame: &RayFrame,
+    arcs: &Arcs,
+    time: f64,
+) -> Option<Found> {
+    let lane = problem.lane;
+    let mut signs = Signs::new(problem, frame);
+    signs.set_arc([arcs.w[0][lane].into(), arcs.w[1][lane].into()]);
+    let texel = problem.cluster.first_texel(lane, problem.surface.map());
+    Walker::new(problem, arcs, lane, texel.to_array(), time).walk::<L>(&mut signs);
+    if signs.is_near_side() {
+        return L::outline(Search { problem, frame });
+    }
+    signs.nearest()
+}
+
+/// [`search`] in a function of its own.
+pub struct Search<'a> {
+    pub problem: &'a Problem<'a>,
+    pub frame: &'a RayFrame,
+}
+
+impl<L: Lanes> Task<L> for Search<'_> {
+    type Output = Option<Found>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Found> {
+        search::<L>(self.problem, self.frame)
+    }
+}
+
+/// The first crossing inside a prism, or any, with all of its curve in f64.
+#[inline(always)]
+fn search<L: Lanes>(problem: &Problem<'_>, frame: &RayFrame) -> Option<Found> {
     let [low, high] = problem.cluster.offsets(problem.lane);
     let range = [f64::from(low), f64::from(high)];
     let reach = low.abs().max(high.abs());
@@ -128,8 +164,8 @@ fn edge_on<L: Lanes>(
     let mut nearest = None;
     for &w in &heights[..count] {
         if let Some(part) = pieces::flat::<L::Quad>(&patch, frame, w) {
-            let mut signs = Signs::new(problem);
-            Walker::<L>::new(problem, &part, view, part.ends()).walk(&mut signs);
+            let mut signs = Signs::new(problem, frame);
+            walk_curve::<L>(problem, &part, view, &mut signs);
             nearest = nearer(nearest, signs.nearest());
         }
     }
@@ -162,8 +198,8 @@ fn along<L: Lanes>(
         return None;
     }
     if problem.cluster.is_short(problem.lane) && pieces::is_even(&curve) {
-        let mut signs = Signs::new(problem);
-        Walker::<L>::new(problem, &curve, view, ends).walk(&mut signs);
+        let mut signs = Signs::new(problem, frame);
+        walk_curve::<L>(problem, &curve, view, &mut signs);
         return signs.nearest();
     }
     L::outline(Uneven {
@@ -172,6 +208,20 @@ fn along<L: Lanes>(
         curve: &curve,
         view,
     })
+}
+
+/// Walks a curve, or a piece of one.
+#[inline(always)]
+fn walk_curve<L: Lanes>(
+    problem: &Problem<'_>,
+    curve: &Curve<L::Quad>,
+    view: &View<L::Quad>,
+    signs: &mut Signs<'_, L::Quad>,
+) {
+    let start = curve.ends()[0];
+    let arcs = Arcs::of_curve::<L>(problem, curve, view, start);
+    signs.set_curve(*curve);
+    Walker::new(problem, &arcs, 0, curve.texel_base, start).walk::<L>(signs);
 }
 
 /// As [`along`], where A changes so much that no one span can be bounded: piece by piece.
@@ -193,7 +243,7 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
         if pieces::is_edge_on(self.view, range) {
             return edge_on::<L>(problem, frame, self.view, range);
         }
-        let mut signs = Signs::new(problem);
+        let mut signs = Signs::new(problem, frame);
         let mut pieces = pieces::Pieces::new(self.curve, self.view);
         while let Some(piece) = pieces.next() {
             let part = match piece {
@@ -201,7 +251,7 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
                 Piece::Flat(w) => pieces::flat(&problem.patch(), frame, w),
             };
             if let Some(part) = part {
-                Walker::<L>::new(problem, &part, self.view, part.ends()).walk(&mut signs);
+                walk_curve::<L>(problem, &part, self.view, &mut signs);
             }
             if signs.is_done() {
                 break;

@@ -5,15 +5,23 @@
 //! sides have a root between them, and only such a root is a hit: as many per prism as the signs at its ends ask for,
 //! give or take pairs.
 
-use crate::prism::curve::{Curve, quadratic};
+use crate::prism::curve::{Curve, View, quadratic};
+use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::{Lanes, Quad, Task};
 use crate::surface::Patch;
 
 use super::{Found, Problem};
 
 /// What has been seen along a prism's curve so far.
-pub struct Signs<'a> {
+pub struct Signs<'a, Q> {
     problem: &'a Problem<'a>,
+    frame: &'a RayFrame,
+    /// The present curve. That of an arc which f32 set up is made when it is first asked for.
+    curve: Option<Curve<Q>>,
+    /// w at both ends of such an arc.
+    arc: Option<[f64; 2]>,
+    /// Whether a crossing lies so near to a side that f64 roots must say on which prism's side.
+    is_near_side: bool,
     /// The side of the last point.
     above: Option<bool>,
     /// Where it was, on the present curve.
@@ -36,10 +44,15 @@ struct Height {
     speed: f64,
 }
 
-impl<'a> Signs<'a> {
-    pub fn new(problem: &'a Problem<'a>) -> Self {
+impl<'a, Q: Quad> Signs<'a, Q> {
+    #[inline(always)]
+    pub fn new(problem: &'a Problem<'a>, frame: &'a RayFrame) -> Self {
         Self {
             problem,
+            frame,
+            curve: None,
+            arc: None,
+            is_near_side: false,
             above: None,
             last: 0.0,
             nearest: None,
@@ -59,12 +72,6 @@ impl<'a> Signs<'a> {
         self.above.is_none()
     }
 
-    /// The side of the last point.
-    #[inline(always)]
-    pub fn is_above(&self) -> Option<bool> {
-        self.above
-    }
-
     /// Whether nothing behind is wanted.
     #[inline(always)]
     pub fn is_done(&self) -> bool {
@@ -78,43 +85,65 @@ impl<'a> Signs<'a> {
         self.done |= self.patience == 0;
     }
 
+    /// What follows is about this curve.
+    #[inline(always)]
+    pub fn set_curve(&mut self, curve: Curve<Q>) {
+        self.curve = Some(curve);
+    }
+
+    /// What follows is about the curve between two w, which may go on outside the prism: crossings there are none of this prism.
+    #[inline(always)]
+    pub fn set_arc(&mut self, w: [f64; 2]) {
+        self.arc = Some(w);
+    }
+
     /// A new curve begins where the last one ended.
     #[inline(always)]
     pub fn begin(&mut self) {
         self.last = 0.0;
     }
 
-    /// Where a point is exactly, and whether it is above S.
+    /// Whether all must be looked at again, in f64 from the beginning.
     #[inline(always)]
-    pub fn look<L: Lanes>(&self, curve: &Curve<L::Quad>, s: f64, side: Side) -> (f64, bool) {
+    pub fn is_near_side(&self) -> bool {
+        self.is_near_side
+    }
+
+    /// The present curve. Called in outlined tasks only: it is long.
+    #[inline(always)]
+    fn curve(&mut self) -> Curve<Q> {
+        if let Some(curve) = self.curve {
+            return curve;
+        }
+        let Problem { cluster, lane, .. } = *self.problem;
+        let corners = cluster.corners::<Q>(lane, self.frame.axes);
+        let [from, to] = self.arc.unwrap_or_default();
+        let view = View::new(&corners, self.frame, from.abs().max(to.abs()));
+        let texels = cluster.texels(lane, self.problem.surface.map());
+        let curve = Curve::between(&view, &texels, [from, to], self.frame.per_depth);
+        self.curve = Some(curve);
+        curve
+    }
+
+    /// A point, and whether it is above S.
+    #[inline(always)]
+    pub fn look<L: Lanes<Quad = Q>>(&mut self, s: f64, side: Side) -> (f64, bool) {
         match side {
             Side::Above => (s, true),
             Side::Below => (s, false),
-            Side::Unknown(line) => L::outline(Look {
-                problem: self.problem,
-                curve,
-                s,
-                line,
-            }),
+            Side::Unknown => L::outline(Look { signs: self, s }),
         }
     }
 
-    /// A point between two that are on the same side of S, and within one cell, that is on the other.
+    /// All points of the curve between two about one texel apart: nothing is crossed between the last point and `from`.
+    /// `guess` is where a crossing would be.
     #[inline(always)]
-    pub fn dip<L: Lanes>(
-        &self,
-        curve: &Curve<L::Quad>,
-        ends: [f64; 2],
-        lines: [Option<TexelLine>; 2],
-        above: bool,
-    ) -> Option<f64> {
-        L::outline(Dip {
-            problem: self.problem,
-            curve,
+    pub fn look_closely<L: Lanes<Quad = Q>>(&mut self, ends: [f64; 2], guess: f64) {
+        L::outline(Closely {
+            signs: self,
             ends,
-            lines,
-            above,
-        })
+            guess,
+        });
     }
 
     /// Whether a crossing between two points whose sides are certain is all that is asked.
@@ -136,7 +165,7 @@ impl<'a> Signs<'a> {
 
     /// The next point. `guess` is where a crossing since the last one would be.
     #[inline(always)]
-    pub fn point<L: Lanes>(&mut self, curve: &Curve<L::Quad>, (s, above): (f64, bool), guess: f64) {
+    pub fn point<L: Lanes<Quad = Q>>(&mut self, (s, above): (f64, bool), guess: f64) {
         // At a corner of the grid two lanes begin at once, and the shorter one may come second.
         if self.done || (s <= self.last && self.above.is_some()) {
             return;
@@ -146,13 +175,30 @@ impl<'a> Signs<'a> {
         if before.is_none_or(|before| before == above) {
             return;
         }
-        let found = L::outline(Crossing {
-            problem: self.problem,
-            curve,
+        L::outline(Crossing {
             bracket: [last, s],
             guess,
             above: !above,
+            signs: self,
         });
+    }
+
+    /// A crossing: is it this prism's, and wanted?
+    #[inline(always)]
+    fn take(&mut self, found: Found) {
+        if self.arc.is_some() {
+            // Roundings of f64 are a millionth of this.
+            const NEAR: f64 = 1e-9;
+            let least = found.u.min(found.v).min(1.0 - found.u - found.v);
+            if least < -NEAR {
+                return;
+            }
+            if least < NEAR {
+                self.is_near_side = true;
+                self.done = true;
+                return;
+            }
+        }
         if !self.problem.accepts(found.t) {
             return;
         }
@@ -168,8 +214,8 @@ impl<'a> Signs<'a> {
 pub enum Side {
     Above,
     Below,
-    /// To be looked at; where the curve is to be exactly on a texel line first.
-    Unknown(Option<TexelLine>),
+    /// To be looked at.
+    Unknown,
 }
 
 impl Side {
@@ -178,14 +224,6 @@ impl Side {
     pub fn of(f: f32) -> Self {
         if f > 0.0 { Self::Above } else { Self::Below }
     }
-}
-
-/// The line x or y = `at`, relative to the curve's texel base. The surface has its crests on such lines.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TexelLine {
-    /// 0 for x, 1 for y.
-    pub axis: usize,
-    pub at: f64,
 }
 
 #[inline(always)]
@@ -224,122 +262,179 @@ fn slope<Q: Quad>(c: &[Q; 3], s: Q) -> Q {
     (c[2] + c[2]).mul_add(s, c[1])
 }
 
-struct Look<'a, Q> {
-    problem: &'a Problem<'a>,
-    curve: &'a Curve<Q>,
+struct Look<'s, 'a, Q> {
+    signs: &'s mut Signs<'a, Q>,
     s: f64,
-    line: Option<TexelLine>,
 }
 
-impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Look<'_, Q> {
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Look<'_, '_, Q> {
     type Output = (f64, bool);
 
     #[inline(always)]
     fn run(self) -> (f64, bool) {
-        let s = match self.line {
-            Some(line) => on_line(self.curve, self.s, line),
-            None => self.s,
-        };
-        let g = height(&self.problem.patch(), self.curve, s).g;
-        (s, g > 0.0)
+        let curve = self.signs.curve();
+        let g = height(&self.signs.problem.patch(), &curve, self.s).g;
+        (self.s, g > 0.0)
     }
 }
 
-/// Where the curve crosses a texel line, near s: two steps of Newton's method.
-#[inline(always)]
-fn on_line<Q: Quad>(curve: &Curve<Q>, near: f64, line: TexelLine) -> f64 {
-    let mut s = near;
-    for _ in 0..2 {
-        let at = Q::splat(s);
-        let inverse = Q::splat(1.0) / quadratic(&curve.depth, at).broadcast::<0>();
-        let place = quadratic(&curve.place, at) * inverse;
-        let turn = slope(&curve.depth, at).broadcast::<0>();
-        let change = (slope(&curve.place, at) - place * turn) * inverse;
-        let miss = place.to_array()[line.axis] - line.at;
-        let moved = s - miss / change.to_array()[line.axis];
-        // Where the curve runs along the line there is nothing to be gained.
-        const FAR: f64 = 1.0 / 64.0;
-        if (moved - near).abs() <= FAR {
-            s = moved;
-        } else {
-            return near;
+struct Closely<'s, 'a, Q> {
+    signs: &'s mut Signs<'a, Q>,
+    ends: [f64; 2],
+    guess: f64,
+}
+
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Closely<'_, '_, Q> {
+    type Output = ();
+
+    /// Goes from one texel line to the next: between two the curve is in one cell, where g has one turning point at most.
+    #[inline(always)]
+    fn run(self) {
+        let Self {
+            signs,
+            ends: [mut from, to],
+            guess,
+        } = self;
+        let curve = &signs.curve();
+        let patch = signs.problem.patch();
+        let breaks = Breaks::new(curve, [from, to]);
+        for k in 0..breaks.count {
+            let s = breaks.all[k];
+            let above = height(&patch, curve, s).g > 0.0;
+            if signs.above == Some(above)
+                && let Some(dip) = dip(&patch, curve, [from, s], above)
+            {
+                signs.point::<L>((dip, !above), dip);
+            }
+            signs.point::<L>((s, above), guess);
+            if signs.done {
+                return;
+            }
+            from = s;
         }
     }
-    s.clamp(0.0, 1.0)
 }
 
-struct Dip<'a, Q> {
-    problem: &'a Problem<'a>,
-    curve: &'a Curve<Q>,
-    ends: [f64; 2],
-    /// The lines that bound the cell there.
-    lines: [Option<TexelLine>; 2],
-    above: bool,
+/// Lines x or y = k that are met between two points about one texel apart.
+const MOST_LINES: usize = 2;
+
+/// Where a curve crosses texel lines, in order, and its end: the surface has its crests on texel lines.
+struct Breaks {
+    /// A curve crosses a line twice at most.
+    all: [f64; 4 * MOST_LINES + 1],
+    count: usize,
 }
 
-impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Dip<'_, Q> {
-    type Output = Option<f64>;
-
-    /// Goes to where the slope of g is 0, by the false position between ends where |g| falls and where it rises.
+impl Breaks {
     #[inline(always)]
-    fn run(self) -> Option<f64> {
-        const MOST_STEPS: usize = 8;
-        let patch = self.problem.patch();
-        let sign = if self.above { 1.0 } else { -1.0 };
-        // A hair inside: beyond the ends are other cells.
-        let aligned =
-            |s: f64, line: Option<TexelLine>| line.map_or(s, |line| on_line(self.curve, s, line));
-        let from = aligned(self.ends[0], self.lines[0]);
-        let to = aligned(self.ends[1], self.lines[1]);
-        let hair = 1e-9 * (to - from);
-        let (mut a, mut b) = (from + hair, to - hair);
-        let mut falls = sign * height(&patch, self.curve, a).slope;
-        let mut rises = sign * height(&patch, self.curve, b).slope;
-        if !(falls < 0.0 && rises > 0.0) {
+    fn new<Q: Quad>(curve: &Curve<Q>, [from, to]: [f64; 2]) -> Self {
+        /// Texels by which a curve may leave the box of two points: a bit more than its distance from their chord.
+        const BEYOND: f64 = 1.0 / 64.0;
+        let mut breaks = Self {
+            all: [to; 4 * MOST_LINES + 1],
+            count: 1,
+        };
+        let [p0, p1, p2] = [
+            curve.place[0].to_array(),
+            curve.place[1].to_array(),
+            curve.place[2].to_array(),
+        ];
+        let [a0, a1, a2] = curve.area();
+        for axis in 0..2 {
+            let (c0, c1, c2) = (p0[axis], p1[axis], p2[axis]);
+            let x = |s: f64| (c0 + s * (c1 + s * c2)) / (a0 + s * (a1 + s * a2));
+            let (a, b) = (x(from), x(to));
+            let first = (a.min(b) - BEYOND).ceil();
+            let last = (a.max(b) + BEYOND).floor();
+            for k in 0..MOST_LINES {
+                let line = first + k as f64;
+                if line <= last {
+                    // X = line A.
+                    breaks.cut([c0 - line * a0, c1 - line * a1, c2 - line * a2], from);
+                }
+            }
+        }
+        breaks
+    }
+
+    /// Takes in the roots of a quadratic that are behind `from` and before the end.
+    #[inline(always)]
+    fn cut(&mut self, [c0, c1, c2]: [f64; 3], from: f64) {
+        let discriminant = c1 * c1 - 4.0 * c0 * c2;
+        // The root of a negative one is no number, and is not taken in.
+        let q = -0.5 * (c1 + discriminant.sqrt().copysign(c1));
+        for root in [q / c2, c0 / q] {
+            let mut k = self.count - 1;
+            if !(root > from && root < self.all[k]) {
+                continue;
+            }
+            self.all[k + 1] = self.all[k];
+            self.count += 1;
+            while k > 0 && self.all[k - 1] > root {
+                self.all[k] = self.all[k - 1];
+                k -= 1;
+            }
+            self.all[k] = root;
+        }
+    }
+}
+
+/// A point between two that are on the same side of S, and in one cell, that is on the other: goes to where the slope of g
+/// is 0, by the false position between ends where |g| falls and where it rises.
+#[inline(always)]
+fn dip<Q: Quad>(
+    patch: &Patch<'_>,
+    curve: &Curve<Q>,
+    [from, to]: [f64; 2],
+    above: bool,
+) -> Option<f64> {
+    const MOST_STEPS: usize = 8;
+    let sign = if above { 1.0 } else { -1.0 };
+    // A hair inside: beyond the ends are other cells.
+    let hair = 1e-9 * (to - from);
+    let (mut a, mut b) = (from + hair, to - hair);
+    let mut falls = sign * height(patch, curve, a).slope;
+    let mut rises = sign * height(patch, curve, b).slope;
+    if !(falls < 0.0 && rises > 0.0) {
+        return None;
+    }
+    for _ in 0..MOST_STEPS {
+        let s = a + (b - a) * (falls / (falls - rises));
+        let at = height(patch, curve, s);
+        if sign * at.g <= 0.0 {
+            return Some(s);
+        }
+        let slope = sign * at.slope;
+        // No lower than a parabola through here: too high to matter.
+        let lowest = sign * at.g - slope.abs() * (b - a);
+        if lowest > 0.0 || slope == 0.0 {
             return None;
         }
-        for _ in 0..MOST_STEPS {
-            let s = a + (b - a) * (falls / (falls - rises));
-            let at = height(&patch, self.curve, s);
-            if sign * at.g <= 0.0 {
-                return Some(s);
-            }
-            let slope = sign * at.slope;
-            // No lower than a parabola through here: too high to matter.
-            let lowest = sign * at.g - slope.abs() * (b - a);
-            if lowest > 0.0 || slope == 0.0 {
-                return None;
-            }
-            if slope < 0.0 {
-                (a, falls) = (s, slope);
-            } else {
-                (b, rises) = (s, slope);
-            }
+        if slope < 0.0 {
+            (a, falls) = (s, slope);
+        } else {
+            (b, rises) = (s, slope);
         }
-        None
     }
+    None
 }
 
-struct Crossing<'a, Q> {
-    problem: &'a Problem<'a>,
-    curve: &'a Curve<Q>,
+struct Crossing<'s, 'a, Q> {
+    signs: &'s mut Signs<'a, Q>,
     bracket: [f64; 2],
     guess: f64,
     above: bool,
 }
 
-impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Crossing<'_, Q> {
-    type Output = Found;
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Crossing<'_, '_, Q> {
+    type Output = ();
 
     #[inline(always)]
-    fn run(self) -> Found {
-        crossing(
-            &self.problem.patch(),
-            self.curve,
-            self.bracket,
-            self.guess,
-            self.above,
-        )
+    fn run(self) {
+        let curve = &self.signs.curve();
+        let patch = self.signs.problem.patch();
+        let found = crossing(&patch, curve, self.bracket, self.guess, self.above);
+        self.signs.take(found);
     }
 }
 

@@ -1,0 +1,472 @@
+//! The curves of a ray through eight prisms in f32, one lane each, with what bounds them.
+//!
+//! An arc is the part of a ray's curve ([`curve`](crate::prism::curve)) that is walked: s in [0, 1] runs over it in the order of t.
+//! [`Arcs::seen`] makes the arcs of a cluster from what a ray [sees](crate::prism::sight) of it, cut where the ray is surely
+//! outside: a hair too long rather than too short, so that points of the arc may lie outside the prism. Where
+//! f32 will not do, and where a prism is folded, [`Arcs::of_curve`] takes a curve that was set up in f64.
+//!
+//! **The bound.** For r = n/A on [0, 1], n and A quadratic: A >= A_min = min(A(0), A(1)) - max(a2, 0)/4;
+//! |r'| <= R = max of the Bernstein coefficients of n'A - nA' over A_min^2; r'' A = n'' - a2'' r - 2 r'A', so
+//! |r''|/2 <= M = (|n2 - a2 r(0)| + R (|a2| + max|A'|)) / A_min; a chord of length ds is left by at most M ds^2/4.
+//! For h = w k with k = |N'(b(s))|, convex in b: |k'| <= K1 = |n1-n0| R_u + |n2-n0| R_v,
+//! |k''|/2 <= K2 = |n1-n0| M_u + |n2-n0| M_v + K1^2/(2 k_min), so |h''|/2 <= |w| K2 + |dw| K1.
+//! To these come the roundings of the f32 evaluation, at most 8 units of the sum of magnitudes that each value is made of;
+//! and of the set-up: with every Q_i off by at most q, sum b_i x_i is off by sum |x_i - x| q / A <= 2 q (max x_i - min x_i) / A.
+
+use super::Problem;
+use super::span::CLOSE;
+use crate::prism::curve::{Curve, View};
+use crate::prism::ray_frame::Anchored;
+use crate::prism::sight::Sight;
+use crate::prism::simd::{LANES, Lanes, Quad};
+use crate::surface::DisplacedSurface;
+
+/// An f32 value is within this many units in the last place of the magnitudes it was computed from.
+pub const ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// The smallest A of an arc, as a part of its largest.
+const EVEN: f32 = 0.25;
+
+/// One number for each lane.
+type Row = [f32; LANES];
+
+/// The coefficients of 1, s, s^2.
+type Rows3 = [Row; 3];
+
+/// Eight arcs.
+#[repr(C, align(32))]
+pub struct Arcs {
+    /// Texel coordinates over A, from a point that the walker knows.
+    pub x: Rows3,
+    pub y: Rows3,
+    /// Barycentrics over A.
+    pub u: Rows3,
+    pub v: Rows3,
+    pub area: Rows3,
+    /// w at both ends.
+    pub w: [Row; 2],
+    /// Height of w in stored texel units: at s = 0, and its change.
+    pub height: [Row; 2],
+    /// |n_i - n_j|^2 of the vertex pairs (0,1), (0,2), (1,2).
+    pub spread: [Row; 3],
+    /// Ray parameters over A, from a point that the walker knows: coefficients of 1 .. s^3.
+    pub time: [Row; 4],
+    /// The same at both ends.
+    pub ends: [Row; 2],
+    /// How far ray parameters are off at most.
+    pub time_off: Row,
+    /// How far barycentrics over A are.
+    pub inside_off: Row,
+    /// Texels that (x, y) move at most.
+    pub reach: Row,
+    /// Half of |(x, y)''| over 2: a chord of length ds is left by this times ds^2.
+    pub bend: Row,
+    /// The same of the height, stored texel units.
+    pub height_bend: Row,
+    /// Rounding of (x, y), texels.
+    pub rounding: Row,
+    /// Rounding of the height, stored texel units.
+    pub height_rounding: Row,
+}
+
+/// What is needed of a surface to make arcs.
+pub struct Units {
+    /// Texels per texture coordinate.
+    texels: [f32; 2],
+    /// Stored texel units per unit of w.
+    per_world: f32,
+    /// The stored value that displaces by nothing.
+    midlevel: f32,
+}
+
+impl Units {
+    #[inline(always)]
+    pub fn new(surface: &DisplacedSurface) -> Self {
+        let (width, height) = surface.map().size();
+        let displacement = surface.displacement();
+        let unit = surface.map().unit();
+        Self {
+            texels: [width as f32, height as f32],
+            per_world: unit / displacement.scale,
+            midlevel: unit * displacement.midlevel,
+        }
+    }
+}
+
+/// Eight arcs in registers.
+struct Lanewise<L> {
+    x: [L; 3],
+    y: [L; 3],
+    u: [L; 3],
+    v: [L; 3],
+    area: [L; 3],
+    height: [L; 2],
+    spread: [L; 3],
+    time: [L; 4],
+}
+
+/// What the set-up of arcs left uncertain.
+struct Uncertain<L> {
+    /// A numerator of a barycentric.
+    area: L,
+    /// Extents of a prism in texels, and in ray parameters.
+    texels: L,
+    time: L,
+    /// Ray parameters beside that.
+    time_off: L,
+}
+
+/// Which arcs of a cluster are to be walked.
+#[derive(Clone, Copy)]
+pub struct Found {
+    /// Lanes with an arc.
+    pub arcs: u32,
+    /// Lanes for which f32 will not do.
+    pub others: u32,
+}
+
+impl Arcs {
+    /// The arcs in the lanes `met` of a cluster.
+    #[inline(always)]
+    pub fn seen<L: Lanes>(
+        sight: &Sight<L>,
+        met: u32,
+        texcoords: [[L; 2]; 3],
+        normals: [[L; 3]; 3],
+        units: &Units,
+        ray: &Anchored,
+    ) -> (Self, Found) {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let off = sight.off;
+        // Twice the area of the offset triangle: positive from here on.
+        let total = sum(sight.areas);
+        let least = total[0].min(total[1]).min(total[2]);
+        let most = total[0].max(total[1]).max(total[2]);
+        let (least, most, flip) = (
+            least.select_negative(zero - most, least),
+            least.select_negative(zero - least, most),
+            least,
+        );
+        let even = least - off * L::splat(5.0) - most * L::splat(EVEN);
+
+        // Q(s) = q0 + s ((1 - s) 2 (q1 - q0) + s (q2 - q0)): below 0 up to s = -q0 over the larger of the two.
+        let (mut from, mut to) = (zero, one);
+        let mut sides = [[zero; 3]; 3];
+        for k in 0..3 {
+            let [q0, q1, q2] = sight.areas[k];
+            let q = [
+                flip.select_negative(zero - q0, q0),
+                flip.select_negative(zero - q1, q1),
+                flip.select_negative(zero - q2, q2),
+            ];
+            let (d01, d12) = (q[1] - q[0], q[1] - q[2]);
+            let d02 = q[2] - q[0];
+            let begin = (zero - (q[0] + off)).max(zero) / (d01 + d01).max(d02);
+            let end = (zero - (q[2] + off)).max(zero) / (d12 + d12).max(zero - d02);
+            from = begin.max(from);
+            to = (one - end).min(to);
+            sides[k] = q;
+        }
+        let hair = L::splat(4.0 * f32::EPSILON);
+        let (from, to) = ((from - hair).max(zero), (to + hair).min(one));
+        let empty = (to - from).sign_mask();
+
+        // In the order of t: see `Curve`.
+        let per_depth = L::splat(ray.per_depth);
+        let turned = flip.select_negative(zero - per_depth, per_depth);
+        let (a, b) = (
+            turned.select_negative(to, from),
+            turned.select_negative(from, to),
+        );
+        let [low, high] = sight.offsets;
+        let (w0, w1) = (a.mul_add(high - low, low), b.mul_add(high - low, low));
+        let dw = w1 - w0;
+        let q = [
+            between(sides[0], a, b),
+            between(sides[1], a, b),
+            between(sides[2], a, b),
+        ];
+        let area = sum(q);
+
+        let [s0, s1, s2] = texcoords;
+        let (width, height) = (L::splat(units.texels[0]), L::splat(units.texels[1]));
+        let (x1, x2) = ((s1[0] - s0[0]) * width, (s2[0] - s0[0]) * width);
+        let (y1, y2) = ((s1[1] - s0[1]) * height, (s2[1] - s0[1]) * height);
+        let depths = weighted(&q, sight.depths);
+        let slopes = weighted(&q, sight.slopes);
+        let time = [
+            w0.mul_add(slopes[0], depths[0]) * per_depth,
+            dw.mul_add(slopes[0], w0.mul_add(slopes[1], depths[1])) * per_depth,
+            dw.mul_add(slopes[1], w0.mul_add(slopes[2], depths[2])) * per_depth,
+            dw * slopes[2] * per_depth,
+        ];
+        let [n0, n1, n2] = normals;
+        let per_world = L::splat(units.per_world);
+        let arcs = Lanewise {
+            x: blend(&q, x1, x2),
+            y: blend(&q, y1, y2),
+            u: q[1],
+            v: q[2],
+            area,
+            height: [w0 * per_world, dw * per_world],
+            spread: [
+                squared_distance(n0, n1),
+                squared_distance(n0, n2),
+                squared_distance(n1, n2),
+            ],
+            time,
+        };
+        let extent = |p: L, q: L| p.max(q).max(zero) - p.min(q).min(zero);
+        let per_depth = per_depth.abs();
+        let mut rows = arcs.bounded(
+            units,
+            &Uncertain {
+                area: off * L::splat(2.5),
+                texels: extent(x1, x2).max(extent(y1, y2)),
+                time: (sight.farthest - sight.nearest) * per_depth,
+                time_off: sight.coordinate * per_depth * L::splat(2.0),
+            },
+        );
+        rows.w = [w0.to_array(), w1.to_array()];
+
+        let (begins, ends) = (L::from_array(rows.ends[0]), L::from_array(rows.ends[1]));
+        let time_off = L::from_array(rows.time_off);
+        let too_early = (ends + time_off - L::splat(ray.interval[0])).sign_mask();
+        let too_late = (L::splat(ray.interval[1]) - (begins - time_off)).sign_mask();
+        // What is no number is not good enough either.
+        let rounding = L::from_array(rows.rounding).min(L::splat(f32::MAX));
+        let coarse = (L::splat(CLOSE) - rounding).sign_mask();
+        let uneven = even.max(L::splat(-1.0)).sign_mask();
+        let others = met & (uneven | coarse);
+        let found = Found {
+            arcs: met & !others & !empty & !too_early & !too_late,
+            others,
+        };
+        (rows, found)
+    }
+
+    /// The arc that is all of a curve, in every lane. Texel coordinates are from the curve's base, ray parameters from `start`.
+    #[inline(always)]
+    pub fn of_curve<L: Lanes>(
+        problem: &Problem<'_>,
+        curve: &Curve<L::Quad>,
+        view: &View<L::Quad>,
+        start: f64,
+    ) -> Self {
+        let units = Units::new(problem.surface);
+        let ([p0, p1, p2], [d0, d1, d2]) = (curve.place, curve.depth);
+        let (p, d) = (
+            [p0.to_f32(), p1.to_f32(), p2.to_f32()],
+            [d0.to_f32(), d1.to_f32(), d2.to_f32()],
+        );
+        let spread = view.spread.to_f32();
+        let ([a0, z0, n0, _], [a1, z1, n1, _]) = (d0.to_array(), d1.to_array());
+        let ([a2, z2, n2, _], [w, dw]) = (d2.to_array(), curve.w);
+        // (Z + w Zn) - depth(0) A, w = w(0) + dw s.
+        let per_depth = curve.per_depth;
+        let time = [
+            (z0 + w * n0) * per_depth - start * a0,
+            (z1 + w * n1 + dw * n0) * per_depth - start * a1,
+            (z2 + w * n2 + dw * n1) * per_depth - start * a2,
+            dw * n2 * per_depth,
+        ];
+        let splat3 = |c: [f32; 3]| [L::splat(c[0]), L::splat(c[1]), L::splat(c[2])];
+        let per_world = f64::from(units.per_world);
+        let zero = L::splat(0.0);
+        let arcs = Lanewise {
+            x: splat3([p[0].x, p[1].x, p[2].x]),
+            y: splat3([p[0].y, p[1].y, p[2].y]),
+            u: splat3([p[0].z, p[1].z, p[2].z]),
+            v: splat3([p[0].w, p[1].w, p[2].w]),
+            area: splat3([d[0].x, d[1].x, d[2].x]),
+            height: [
+                L::splat((w * per_world) as f32),
+                L::splat((dw * per_world) as f32),
+            ],
+            spread: splat3([spread.x, spread.z, spread.y]),
+            time: [
+                L::splat(time[0] as f32),
+                L::splat(time[1] as f32),
+                L::splat(time[2] as f32),
+                L::splat(time[3] as f32),
+            ],
+        };
+        let mut rows = arcs.bounded(
+            &units,
+            &Uncertain {
+                area: zero,
+                texels: zero,
+                time: zero,
+                time_off: zero,
+            },
+        );
+        rows.w = [[w as f32; LANES], [(w + dw) as f32; LANES]];
+        rows
+    }
+}
+
+impl<L: Lanes> Lanewise<L> {
+    /// With their bounds: see the module's documentation.
+    #[inline(always)]
+    fn bounded(&self, units: &Units, uncertain: &Uncertain<L>) -> Arcs {
+        let zero = L::splat(0.0);
+        let [a0, a1, a2] = self.area;
+        let end = a0 + a1 + a2;
+        let least = a0.min(end) - a2.max(zero) * L::splat(0.25) - uncertain.area * L::splat(3.0);
+        let inverse = L::splat(1.0) / least;
+        // Of the bounds themselves: f32 is good for more than four digits here.
+        let generous = L::splat(1.000_1);
+        let shared = Shared {
+            area: self.area,
+            per_start: L::splat(1.0) / a0,
+            inverse,
+            squared: inverse * inverse * generous,
+            steepest: a2.abs() + a1.abs().max((a1 + a2 + a2).abs()),
+            magnitude: a0.abs() + a1.abs() + a2.abs(),
+        };
+        let (x, y) = (shared.bounds(self.x), shared.bounds(self.y));
+        let (u, v) = (shared.bounds(self.u), shared.bounds(self.v));
+        let inside_off = uncertain.area * inverse * L::splat(2.0);
+        let reach = x.slope.max(y.slope);
+        let rounding = x.rounding.max(y.rounding)
+            + inside_off * uncertain.texels
+            + reach * L::splat(f32::EPSILON);
+
+        let [s01, s02, s12] = self.spread;
+        let widest = s01.max(s02).max(s12);
+        let (turn1, turn2) = (s01.sqrt(), s02.sqrt());
+        // At least the largest 1/|N'|: |N'|^2 = 1 - sum b_i b_j spread_ij.
+        let shortest = (L::splat(1.0) - widest * L::splat(1.0 / 3.0)).max(L::splat(1e-6));
+        let stretch = L::splat(1.000_01) / shortest.sqrt();
+        let turn = turn1.mul_add(u.slope, turn2 * v.slope);
+        let turn_bend =
+            turn1.mul_add(u.bend, turn2 * v.bend) + turn * turn * stretch * L::splat(0.5);
+        let [h0, h1] = self.height;
+        let highest = h0.abs().max((h0 + h1).abs());
+        let height_bend = highest.mul_add(turn_bend, h1.abs() * turn);
+        let highest = highest * stretch;
+        let unsure = turn1.mul_add(u.rounding + inside_off, turn2 * (v.rounding + inside_off));
+        let height_rounding = highest.mul_add(
+            unsure,
+            (highest + L::splat(units.midlevel.abs())) * L::splat(ROUNDING),
+        );
+
+        let [c0, c1, c2, c3] = self.time;
+        let last = c0 + c1 + c2 + c3;
+        let magnitude = c0.abs() + c1.abs() + c2.abs() + c3.abs();
+        let time_off = magnitude * inverse * L::splat(8.0 * ROUNDING)
+            + inside_off * uncertain.time
+            + uncertain.time_off;
+        Arcs {
+            x: stored(self.x),
+            y: stored(self.y),
+            u: stored(self.u),
+            v: stored(self.v),
+            area: stored(self.area),
+            w: [[0.0; LANES]; 2],
+            height: [h0.to_array(), h1.to_array()],
+            spread: stored(self.spread),
+            time: [c0.to_array(), c1.to_array(), c2.to_array(), c3.to_array()],
+            ends: [(c0 * shared.per_start).to_array(), (last / end).to_array()],
+            time_off: time_off.to_array(),
+            inside_off: (inside_off + L::splat(4.0 * ROUNDING)).to_array(),
+            reach: reach.to_array(),
+            bend: (x.bend.max(y.bend) * L::splat(0.25)).to_array(),
+            height_bend: (height_bend * L::splat(0.25 * 1.000_1)).to_array(),
+            rounding: rounding.to_array(),
+            height_rounding: height_rounding.to_array(),
+        }
+    }
+}
+
+/// What the ratios over one A have in common.
+struct Shared<L> {
+    area: [L; 3],
+    /// 1 / A(0), 1 / A_min, and the square of that.
+    per_start: L,
+    inverse: L,
+    squared: L,
+    /// |a2| + max|A'|.
+    steepest: L,
+    magnitude: L,
+}
+
+/// Bounds of a ratio.
+struct Bounds<L> {
+    /// |r'|.
+    slope: L,
+    /// |r''| / 2.
+    bend: L,
+    rounding: L,
+}
+
+impl<L: Lanes> Shared<L> {
+    #[inline(always)]
+    fn bounds(&self, [n0, n1, n2]: [L; 3]) -> Bounds<L> {
+        let [a0, a1, a2] = self.area;
+        let d1 = n0.neg_mul_add(a1, n1 * a0);
+        let d2 = n0.neg_mul_add(a2, n2 * a0);
+        let middle = d1 + d2;
+        let last = middle + d2 + n1.neg_mul_add(a2, n2 * a1);
+        let slope = d1.abs().max(middle.abs()).max(last.abs()) * self.squared;
+        let start = n0 * self.per_start;
+        let bend = slope.mul_add(self.steepest, start.neg_mul_add(a2, n2).abs()) * self.inverse;
+        let largest = (start.abs() + slope) * self.magnitude;
+        let magnitude = n0.abs() + n1.abs() + n2.abs() + largest;
+        Bounds {
+            slope,
+            bend,
+            rounding: magnitude * self.inverse * L::splat(ROUNDING),
+        }
+    }
+}
+
+#[inline(always)]
+fn stored<L: Lanes>([a, b, c]: [L; 3]) -> Rows3 {
+    [a.to_array(), b.to_array(), c.to_array()]
+}
+
+/// The sum of the three sides, coefficient by coefficient.
+#[inline(always)]
+fn sum<L: Lanes>([p, q, r]: [[L; 3]; 3]) -> [L; 3] {
+    [p[0] + q[0] + r[0], p[1] + q[1] + r[1], p[2] + q[2] + r[2]]
+}
+
+/// A quadratic in Bernstein form over [a, b] of it: coefficients of 1, s, s^2.
+#[inline(always)]
+fn between<L: Lanes>([q0, q1, q2]: [L; 3], a: L, b: L) -> [L; 3] {
+    let (d0, d1) = (q1 - q0, q2 - q1);
+    let (left, right) = (a.mul_add(d0, q0), a.mul_add(d1, q1));
+    let first = a.mul_add(right - left, left);
+    let middle = b.mul_add(right - left, left);
+    let (left, right) = (b.mul_add(d0, q0), b.mul_add(d1, q1));
+    let last = b.mul_add(right - left, left);
+    let (rise, more) = (middle - first, last - middle);
+    [first, rise + rise, more - rise]
+}
+
+/// sum of the sides' quadratics times one number each.
+#[inline(always)]
+fn weighted<L: Lanes>([p, q, r]: &[[L; 3]; 3], [a, b, c]: [L; 3]) -> [L; 3] {
+    [
+        p[0].mul_add(a, q[0].mul_add(b, r[0] * c)),
+        p[1].mul_add(a, q[1].mul_add(b, r[1] * c)),
+        p[2].mul_add(a, q[2].mul_add(b, r[2] * c)),
+    ]
+}
+
+/// The same with nothing for the first side.
+#[inline(always)]
+fn blend<L: Lanes>([_, q, r]: &[[L; 3]; 3], b: L, c: L) -> [L; 3] {
+    [
+        q[0].mul_add(b, r[0] * c),
+        q[1].mul_add(b, r[1] * c),
+        q[2].mul_add(b, r[2] * c),
+    ]
+}
+
+#[inline(always)]
+fn squared_distance<L: Lanes>([px, py, pz]: [L; 3], [qx, qy, qz]: [L; 3]) -> L {
+    let (x, y, z) = (qx - px, qy - py, qz - pz);
+    x.mul_add(x, y.mul_add(y, z * z))
+}
