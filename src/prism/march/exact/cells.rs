@@ -95,11 +95,11 @@ impl Chord {
             f: [ZEROS; 3],
             off: ZEROS,
         };
-        let mut possible = 0;
         let zero = L::splat(0.0);
         let one = L::splat(1.0);
         // The chord is off by as much, and a cell may be taken for its neighbour within `NUDGE`.
         let near = self.off.place + NUDGE;
+        let mut steepest = zero;
         for batch in 0..BATCHES {
             let first = (batch * LANES) as f32;
             if first >= count {
@@ -143,7 +143,7 @@ impl Chord {
             let f1 = slope_y.neg_mul_add(my, slope_x.neg_mul_add(mx, length * L::splat(dh)));
             let f2 = (twist * mx).neg_mul_add(my, zero);
 
-            // Where the chord passes a corner of its cell closely the curve may touch cells of which no lane knows.
+            // How far the ends are from corners of the cell: see below.
             let (gone_x, gone_y) = (fx + mx, fy + my);
             let (apart_x, apart_y) = (fx.min(one - fx), fy.min(one - fy));
             let begin = at_x_line.select_negative(apart_y, apart_x);
@@ -151,12 +151,32 @@ impl Chord {
             let (apart_x, apart_y) = (gone_x.min(one - gone_x), gone_y.min(one - gone_y));
             let end = (leaves_x - leaves_y).select_negative(apart_y, apart_x);
             let end = (leaves - one).select_negative(end, apart_x.min(apart_y));
-            let steepest =
+            let slope =
                 bottom.abs().max((bottom + twist).abs()) + left.abs().max((left + twist).abs());
-            let off = steepest.mul_add(L::splat(near), L::splat(self.off.height));
-            let wide = 2.0 * near * self.off.range + self.off.height;
-            let off = (begin.min(end) - L::splat(2.0 * near)).select_negative(L::splat(wide), off);
-
+            let unused = L::splat(count - 0.5) - numbers;
+            steepest = steepest.max(unused.select_negative(zero, slope));
+            cells.start[batch] = start.to_array();
+            cells.length[batch] = length.to_array();
+            cells.f[0][batch] = f0.to_array();
+            cells.f[1][batch] = f1.to_array();
+            cells.f[2][batch] = f2.to_array();
+            cells.off[batch] = begin.min(end).to_array();
+        }
+        // The curve is in a lane's cell, or in the next or last one, as far as it is from the chord. Where the chord passes a
+        // corner closely it may touch cells of which no lane knows.
+        let off = steepest.max_lane() * near + self.off.height;
+        let wide = 2.0 * near * self.off.range + self.off.height;
+        let mut possible = 0;
+        for batch in 0..BATCHES {
+            let first = (batch * LANES) as f32;
+            if first >= count {
+                break;
+            }
+            let f0 = L::from_array(cells.f[0][batch]);
+            let f1 = L::from_array(cells.f[1][batch]);
+            let f2 = L::from_array(cells.f[2][batch]);
+            let off = (L::from_array(cells.off[batch]) - L::splat(2.0 * near))
+                .select_negative(L::splat(wide), L::splat(off));
             // With the sign at the start made positive: can f come within `off` of 0?
             let g0 = f0.abs() - off;
             let g1 = f0.select_negative(zero - f1, f1);
@@ -166,17 +186,8 @@ impl Chord {
             let crosses = g0.sign_mask() | at_end.sign_mask();
             // The parabola turns between the ends, upward, and has a root.
             let turns = g1.sign_mask() & !(g1 + g2 + g2).sign_mask() & !discriminant.sign_mask();
-            let used = (numbers - L::splat(count - 0.5)).sign_mask();
-            let found = (crosses | turns) & used;
-            if found == 0 {
-                continue;
-            }
-            possible |= found << (batch * LANES);
-            cells.start[batch] = start.to_array();
-            cells.length[batch] = length.to_array();
-            cells.f[0][batch] = f0.to_array();
-            cells.f[1][batch] = f1.to_array();
-            cells.f[2][batch] = f2.to_array();
+            let used = ((1u64 << (count - first).min(LANES as f32) as u32) - 1) as u32;
+            possible |= ((crosses | turns) & used) << (batch * LANES);
             cells.off[batch] = off.to_array();
         }
         if possible == 0 {
