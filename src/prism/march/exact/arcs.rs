@@ -233,9 +233,9 @@ impl Arcs {
         let time_off = L::from_array(rows.time_off);
         let too_early = (ends + time_off - L::splat(ray.interval[0])).sign_mask();
         let too_late = (L::splat(ray.interval[1]) - (begins - time_off)).sign_mask();
-        // What is no number is not good enough either.
+        // What is no number is not good enough either, nor what was divided by an A below 0.
         let rounding = L::from_array(rows.rounding).min(L::splat(f32::MAX));
-        let coarse = (L::splat(CLOSE) - rounding).sign_mask();
+        let coarse = (L::splat(CLOSE) - rounding).sign_mask() | rounding.sign_mask();
         let uneven = even.max(L::splat(-1.0)).sign_mask();
         let others = met & (uneven | coarse);
         let found = Found {
