@@ -3,9 +3,9 @@
 //! Along a chord (x, y, h) is linear, and in one cell the surface is bilinear in (x, y): f = h - D is a quadratic in the
 //! chord's parameter. Lane 0 is the cell in which the chord starts; every other lane is the cell entered by one crossing of a
 //! texel line, in no order: it leaves at the next line. A lane in which |f| provably stays above what the chord may be
-//! off is done with; the others are reported in order, with both ends and the turning point between.
+//! off is done with; f64 looks at the others, in order.
 
-use super::signs::{Side, Signs, TexelLine};
+use super::signs::{Side, Signs};
 use crate::prism::curve::Curve;
 use crate::prism::simd::{Grid, LANES, Lanes};
 
@@ -31,18 +31,13 @@ pub struct Chord {
     pub cut: bool,
 }
 
-/// The lanes' cells and quadratics.
+/// The lanes' stretches and quadratics.
 struct Cells {
-    /// Column and row, relative to the chord's first cell.
-    column: [f32; LANES],
-    row: [f32; LANES],
     /// The chord's parameter where the lane begins, and how far it goes.
     start: [f32; LANES],
     length: [f32; LANES],
     /// f over the lane's own parameter in [0, 1].
     f: [[f32; LANES]; 3],
-    /// Lanes that begin at an x line.
-    at_x: f32,
 }
 
 impl Chord {
@@ -128,12 +123,9 @@ impl Chord {
             return;
         }
         let cells = Cells {
-            column: i.to_array(),
-            row: j.to_array(),
             start: start.to_array(),
             length: length.to_array(),
             f: [f0.to_array(), f1.to_array(), f2.to_array()],
-            at_x: nx,
         };
         self.report::<L>(possible, &cells, curve, signs);
     }
@@ -155,18 +147,13 @@ impl Chord {
             let [f0, f1, f2] = [cells.f[0][lane], cells.f[1][lane], cells.f[2][lane]];
             let end = f0 + f1 + f2;
             // Signs at both ends that differ by more than f may be off: one crossing, whatever else. In all other lanes
-            // f64 looks: where the chord passes the texel lines, since what is proven of lanes is proven up to there,
-            // and where the curve does, since there are the crests.
+            // f64 looks, from where the lane begins to where it ends: what is proven of lanes is proven up to there.
             let sure = |f: f32| f.abs() > self.off;
             let certain = sure(f0) && sure(end) && (f0 > 0.0) != (end > 0.0);
             let (from, to) = (s(start), s(start + length));
             // Between the last point and this lane nothing is crossed: only the first lane needs its beginning.
             if signs.is_fresh() {
-                let side = if certain {
-                    Side::of(f0)
-                } else {
-                    Side::Unknown(None)
-                };
+                let side = if certain { Side::of(f0) } else { Side::Unknown };
                 let begin = signs.look::<L>(curve, from, side);
                 signs.point::<L>(curve, begin, from);
             }
@@ -177,75 +164,11 @@ impl Chord {
                 }
                 signs.point::<L>(curve, (to, end > 0.0), root);
             } else {
-                let lines = [self.begin_line(cells, lane), self.end_line(cells, lane)];
-                self.look_closely::<L>([from, to], lines, root, curve, signs);
+                signs.look_closely::<L>(curve, [from, to], root);
             }
             if signs.is_done() {
                 return;
             }
-        }
-    }
-
-    /// All points of a lane of which f32 knows too little.
-    #[inline(always)]
-    fn look_closely<L: Lanes>(
-        &self,
-        [from, to]: [f64; 2],
-        lines: [Option<TexelLine>; 2],
-        root: f64,
-        curve: &Curve<L::Quad>,
-        signs: &mut Signs<'_>,
-    ) {
-        if lines[0].is_some() {
-            let begin = signs.look::<L>(curve, from, Side::Unknown(lines[0]));
-            signs.point::<L>(curve, begin, begin.0);
-        }
-        let after = signs.look::<L>(curve, to, Side::Unknown(lines[1]));
-        if signs.is_above() == Some(after.1)
-            && let Some(dip) = signs.dip::<L>(curve, [from, to], lines, after.1)
-        {
-            signs.point::<L>(curve, (dip, !after.1), dip);
-        }
-        signs.point::<L>(curve, after, root);
-        if lines[1].is_some() && to > after.0 {
-            let beyond = signs.look::<L>(curve, to, Side::Unknown(None));
-            signs.point::<L>(curve, beyond, to);
-        }
-    }
-
-    /// The texel line at which a lane begins; lane 0 begins where the chord does.
-    #[inline(always)]
-    fn begin_line(&self, cells: &Cells, lane: usize) -> Option<TexelLine> {
-        let axis = usize::from(lane as f32 > cells.at_x);
-        (lane > 0).then(|| self.line(cells, lane, axis, 0.0))
-    }
-
-    /// The texel line at which a lane ends, if the chord goes on.
-    #[inline(always)]
-    fn end_line(&self, cells: &Cells, lane: usize) -> Option<TexelLine> {
-        let leaves = |axis: usize| {
-            let line = self.line(cells, lane, axis, 1.0).at as f32;
-            (line - self.from[axis]) / (self.to[axis] - self.from[axis])
-        };
-        let (x, y) = (leaves(0), leaves(1));
-        // Along y, x is infinite or no number.
-        let axis = if x <= y { 0 } else { 1 };
-        (x.min(y) < 1.0).then(|| self.line(cells, lane, axis, 1.0))
-    }
-
-    /// The line through which a lane enters its cell (0) or leaves it (1).
-    #[inline(always)]
-    fn line(&self, cells: &Cells, lane: usize, axis: usize, end: f32) -> TexelLine {
-        let cell = if axis == 0 {
-            cells.column[lane]
-        } else {
-            cells.row[lane]
-        };
-        let forward = (self.to[axis] - self.from[axis]).is_sign_positive();
-        let offset = if forward { end } else { 1.0 - end };
-        TexelLine {
-            axis,
-            at: f64::from(self.cells[0][axis]) + f64::from(cell + offset),
         }
     }
 }

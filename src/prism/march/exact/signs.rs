@@ -59,12 +59,6 @@ impl<'a> Signs<'a> {
         self.above.is_none()
     }
 
-    /// The side of the last point.
-    #[inline(always)]
-    pub fn is_above(&self) -> Option<bool> {
-        self.above
-    }
-
     /// Whether nothing behind is wanted.
     #[inline(always)]
     pub fn is_done(&self) -> bool {
@@ -84,37 +78,30 @@ impl<'a> Signs<'a> {
         self.last = 0.0;
     }
 
-    /// Where a point is exactly, and whether it is above S.
+    /// A point, and whether it is above S.
     #[inline(always)]
     pub fn look<L: Lanes>(&self, curve: &Curve<L::Quad>, s: f64, side: Side) -> (f64, bool) {
         match side {
             Side::Above => (s, true),
             Side::Below => (s, false),
-            Side::Unknown(line) => L::outline(Look {
+            Side::Unknown => L::outline(Look {
                 problem: self.problem,
                 curve,
                 s,
-                line,
             }),
         }
     }
 
-    /// A point between two that are on the same side of S, and within one cell, that is on the other.
+    /// All points of the curve between two about one texel apart: nothing is crossed between the last point and `from`.
+    /// `guess` is where a crossing would be.
     #[inline(always)]
-    pub fn dip<L: Lanes>(
-        &self,
-        curve: &Curve<L::Quad>,
-        ends: [f64; 2],
-        lines: [Option<TexelLine>; 2],
-        above: bool,
-    ) -> Option<f64> {
-        L::outline(Dip {
-            problem: self.problem,
+    pub fn look_closely<L: Lanes>(&mut self, curve: &Curve<L::Quad>, ends: [f64; 2], guess: f64) {
+        L::outline(Closely {
+            signs: self,
             curve,
             ends,
-            lines,
-            above,
-        })
+            guess,
+        });
     }
 
     /// Whether a crossing between two points whose sides are certain is all that is asked.
@@ -168,8 +155,8 @@ impl<'a> Signs<'a> {
 pub enum Side {
     Above,
     Below,
-    /// To be looked at; where the curve is to be exactly on a texel line first.
-    Unknown(Option<TexelLine>),
+    /// To be looked at.
+    Unknown,
 }
 
 impl Side {
@@ -178,14 +165,6 @@ impl Side {
     pub fn of(f: f32) -> Self {
         if f > 0.0 { Self::Above } else { Self::Below }
     }
-}
-
-/// The line x or y = `at`, relative to the curve's texel base. The surface has its crests on such lines.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TexelLine {
-    /// 0 for x, 1 for y.
-    pub axis: usize,
-    pub at: f64,
 }
 
 #[inline(always)]
@@ -228,7 +207,6 @@ struct Look<'a, Q> {
     problem: &'a Problem<'a>,
     curve: &'a Curve<Q>,
     s: f64,
-    line: Option<TexelLine>,
 }
 
 impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Look<'_, Q> {
@@ -236,88 +214,151 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Look<'_, Q> {
 
     #[inline(always)]
     fn run(self) -> (f64, bool) {
-        let s = match self.line {
-            Some(line) => on_line(self.curve, self.s, line),
-            None => self.s,
-        };
-        let g = height(&self.problem.patch(), self.curve, s).g;
-        (s, g > 0.0)
+        let g = height(&self.problem.patch(), self.curve, self.s).g;
+        (self.s, g > 0.0)
     }
 }
 
-/// Where the curve crosses a texel line, near s: two steps of Newton's method.
-#[inline(always)]
-fn on_line<Q: Quad>(curve: &Curve<Q>, near: f64, line: TexelLine) -> f64 {
-    let mut s = near;
-    for _ in 0..2 {
-        let at = Q::splat(s);
-        let inverse = Q::splat(1.0) / quadratic(&curve.depth, at).broadcast::<0>();
-        let place = quadratic(&curve.place, at) * inverse;
-        let turn = slope(&curve.depth, at).broadcast::<0>();
-        let change = (slope(&curve.place, at) - place * turn) * inverse;
-        let miss = place.to_array()[line.axis] - line.at;
-        let moved = s - miss / change.to_array()[line.axis];
-        // Where the curve runs along the line there is nothing to be gained.
-        const FAR: f64 = 1.0 / 64.0;
-        if (moved - near).abs() <= FAR {
-            s = moved;
-        } else {
-            return near;
+struct Closely<'s, 'a, Q> {
+    signs: &'s mut Signs<'a>,
+    curve: &'s Curve<Q>,
+    ends: [f64; 2],
+    guess: f64,
+}
+
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Closely<'_, '_, Q> {
+    type Output = ();
+
+    /// Goes from one texel line to the next: between two the curve is in one cell, where g has one turning point at most.
+    #[inline(always)]
+    fn run(self) {
+        let Self {
+            signs,
+            curve,
+            ends: [mut from, to],
+            guess,
+        } = self;
+        let patch = signs.problem.patch();
+        let breaks = Breaks::new(curve, [from, to]);
+        for k in 0..breaks.count {
+            let s = breaks.all[k];
+            let above = height(&patch, curve, s).g > 0.0;
+            if signs.above == Some(above)
+                && let Some(dip) = dip(&patch, curve, [from, s], above)
+            {
+                signs.point::<L>(curve, (dip, !above), dip);
+            }
+            signs.point::<L>(curve, (s, above), guess);
+            if signs.done {
+                return;
+            }
+            from = s;
         }
     }
-    s.clamp(0.0, 1.0)
 }
 
-struct Dip<'a, Q> {
-    problem: &'a Problem<'a>,
-    curve: &'a Curve<Q>,
-    ends: [f64; 2],
-    /// The lines that bound the cell there.
-    lines: [Option<TexelLine>; 2],
-    above: bool,
+/// Lines x or y = k that are met between two points about one texel apart.
+const MOST_LINES: usize = 2;
+
+/// Where a curve crosses texel lines, in order, and its end: the surface has its crests on texel lines.
+struct Breaks {
+    /// A curve crosses a line twice at most.
+    all: [f64; 4 * MOST_LINES + 1],
+    count: usize,
 }
 
-impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Dip<'_, Q> {
-    type Output = Option<f64>;
-
-    /// Goes to where the slope of g is 0, by the false position between ends where |g| falls and where it rises.
+impl Breaks {
     #[inline(always)]
-    fn run(self) -> Option<f64> {
-        const MOST_STEPS: usize = 8;
-        let patch = self.problem.patch();
-        let sign = if self.above { 1.0 } else { -1.0 };
-        // A hair inside: beyond the ends are other cells.
-        let aligned =
-            |s: f64, line: Option<TexelLine>| line.map_or(s, |line| on_line(self.curve, s, line));
-        let from = aligned(self.ends[0], self.lines[0]);
-        let to = aligned(self.ends[1], self.lines[1]);
-        let hair = 1e-9 * (to - from);
-        let (mut a, mut b) = (from + hair, to - hair);
-        let mut falls = sign * height(&patch, self.curve, a).slope;
-        let mut rises = sign * height(&patch, self.curve, b).slope;
-        if !(falls < 0.0 && rises > 0.0) {
+    fn new<Q: Quad>(curve: &Curve<Q>, [from, to]: [f64; 2]) -> Self {
+        /// Texels by which a curve may leave the box of two points: a bit more than its distance from their chord.
+        const BEYOND: f64 = 1.0 / 64.0;
+        let mut breaks = Self {
+            all: [to; 4 * MOST_LINES + 1],
+            count: 1,
+        };
+        let [p0, p1, p2] = [
+            curve.place[0].to_array(),
+            curve.place[1].to_array(),
+            curve.place[2].to_array(),
+        ];
+        let [a0, a1, a2] = curve.area();
+        for axis in 0..2 {
+            let (c0, c1, c2) = (p0[axis], p1[axis], p2[axis]);
+            let x = |s: f64| (c0 + s * (c1 + s * c2)) / (a0 + s * (a1 + s * a2));
+            let (a, b) = (x(from), x(to));
+            let first = (a.min(b) - BEYOND).ceil();
+            let last = (a.max(b) + BEYOND).floor();
+            for k in 0..MOST_LINES {
+                let line = first + k as f64;
+                if line <= last {
+                    // X = line A.
+                    breaks.cut([c0 - line * a0, c1 - line * a1, c2 - line * a2], from);
+                }
+            }
+        }
+        breaks
+    }
+
+    /// Takes in the roots of a quadratic that are behind `from` and before the end.
+    #[inline(always)]
+    fn cut(&mut self, [c0, c1, c2]: [f64; 3], from: f64) {
+        let discriminant = c1 * c1 - 4.0 * c0 * c2;
+        // The root of a negative one is no number, and is not taken in.
+        let q = -0.5 * (c1 + discriminant.sqrt().copysign(c1));
+        for root in [q / c2, c0 / q] {
+            let mut k = self.count - 1;
+            if !(root > from && root < self.all[k]) {
+                continue;
+            }
+            self.all[k + 1] = self.all[k];
+            self.count += 1;
+            while k > 0 && self.all[k - 1] > root {
+                self.all[k] = self.all[k - 1];
+                k -= 1;
+            }
+            self.all[k] = root;
+        }
+    }
+}
+
+/// A point between two that are on the same side of S, and in one cell, that is on the other: goes to where the slope of g
+/// is 0, by the false position between ends where |g| falls and where it rises.
+#[inline(always)]
+fn dip<Q: Quad>(
+    patch: &Patch<'_>,
+    curve: &Curve<Q>,
+    [from, to]: [f64; 2],
+    above: bool,
+) -> Option<f64> {
+    const MOST_STEPS: usize = 8;
+    let sign = if above { 1.0 } else { -1.0 };
+    // A hair inside: beyond the ends are other cells.
+    let hair = 1e-9 * (to - from);
+    let (mut a, mut b) = (from + hair, to - hair);
+    let mut falls = sign * height(patch, curve, a).slope;
+    let mut rises = sign * height(patch, curve, b).slope;
+    if !(falls < 0.0 && rises > 0.0) {
+        return None;
+    }
+    for _ in 0..MOST_STEPS {
+        let s = a + (b - a) * (falls / (falls - rises));
+        let at = height(patch, curve, s);
+        if sign * at.g <= 0.0 {
+            return Some(s);
+        }
+        let slope = sign * at.slope;
+        // No lower than a parabola through here: too high to matter.
+        let lowest = sign * at.g - slope.abs() * (b - a);
+        if lowest > 0.0 || slope == 0.0 {
             return None;
         }
-        for _ in 0..MOST_STEPS {
-            let s = a + (b - a) * (falls / (falls - rises));
-            let at = height(&patch, self.curve, s);
-            if sign * at.g <= 0.0 {
-                return Some(s);
-            }
-            let slope = sign * at.slope;
-            // No lower than a parabola through here: too high to matter.
-            let lowest = sign * at.g - slope.abs() * (b - a);
-            if lowest > 0.0 || slope == 0.0 {
-                return None;
-            }
-            if slope < 0.0 {
-                (a, falls) = (s, slope);
-            } else {
-                (b, rises) = (s, slope);
-            }
+        if slope < 0.0 {
+            (a, falls) = (s, slope);
+        } else {
+            (b, rises) = (s, slope);
         }
-        None
     }
+    None
 }
 
 struct Crossing<'a, Q> {

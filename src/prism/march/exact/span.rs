@@ -350,7 +350,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
         if span[1] - span[0] < 16.0 * f32::EPSILON {
             let (a, b) = (f64::from(span[0]), f64::from(span[1]));
             for s in [a, b] {
-                let point = signs.look::<L>(self.curve, s, Side::Unknown(None));
+                let point = signs.look::<L>(self.curve, s, Side::Unknown);
                 signs.point::<L>(self.curve, point, s);
             }
             return 0;
