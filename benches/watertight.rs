@@ -5,8 +5,8 @@
 //! Prints a Markdown table and up to three odd lines per mesh.
 //!
 //! *Tied* lines are odd ones which in exact arithmetic cross twice within four units in the last place of t, or touch
-//! without crossing: no t in single precision is strictly between such crossings, so a count by restarting the ray
-//! cannot see both.
+//! without crossing, as far as the oracle can tell: where two crossings have one t in single precision, a count by
+//! restarting the ray there cannot see both.
 
 #[path = "common/mod.rs"]
 mod common;

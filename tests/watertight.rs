@@ -10,7 +10,9 @@ use std::sync::Arc;
 
 use common::closed::{self, Closed};
 use common::numbers::Numbers;
+use glam::vec3;
 use oracle::{EDGE, Line, Oracle};
+use prismarch::ray::Ray;
 use prismarch::trace::{Object, Placement, Shape, Tracer, World};
 
 /// Lines per mesh, and as many rays from inside.
@@ -80,6 +82,32 @@ fn the_oracle_sees_no_holes() {
             }
             assert_eq!(depth, 0, "{}: {ray:?} {found:?}", closed.name);
         }
+    }
+}
+
+/// A ray that starts behind a pair of close crossings meets the next as one from afar does. From there the march begins
+/// less than the width of a rounding before a texel line, behind which the surface is crossed twice.
+#[test]
+fn a_restart_before_a_texel_line_misses_nothing() {
+    let closed = &closed::all()[0];
+    let prisms = closed.prisms();
+    let mut ray = Ray::new(
+        vec3(-1.491_691, -0.987_052_3, -1.746_592_5),
+        vec3(0.828_222_5, 0.420_310_5, 0.370_657_03),
+    );
+    let oracle = Oracle::new(&closed.surface);
+    let line = Line::from(&ray);
+    let all = oracle.trace(&line, EDGE).all;
+    assert!(all.len() > 10 && all.len().is_multiple_of(2) && all.iter().all(|c| c.sure));
+    for crossing in &all {
+        let hit = (0..prisms.len() as u32)
+            .filter_map(|cluster| prisms.intersect(cluster, &ray))
+            .min_by(|a, b| a.t.total_cmp(&b.t))
+            .expect("one more crossing");
+        assert_eq!(hit.prim, crossing.prim, "{hit:?} {crossing:?}");
+        let off = (f64::from(hit.t) - crossing.t).abs();
+        assert!(off < 3e-7, "{hit:?} {crossing:?}");
+        ray.tnear = hit.t;
     }
 }
 
