@@ -107,7 +107,7 @@ impl<L: Lanes> Task<L> for Search<'_> {
 
 /// The first crossing inside a prism, or any, with all of its curve in f64.
 #[inline(always)]
-fn search<L: Lanes>(problem: &Problem<'_>, frame: &RayFrame) -> Option<Found> {
+pub fn search<L: Lanes>(problem: &Problem<'_>, frame: &RayFrame) -> Option<Found> {
     let [low, high] = problem.cluster.offsets(problem.lane);
     let range = [f64::from(low), f64::from(high)];
     let reach = low.abs().max(high.abs());

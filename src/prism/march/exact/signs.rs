@@ -456,6 +456,7 @@ fn crossing<Q: Quad>(
     } else {
         0.5 * (from + to)
     };
+    let mut last_step = to - from;
     for _ in 0..MOST_STEPS {
         let at = height(patch, curve, s);
         if (at.g > 0.0) == above {
@@ -465,11 +466,17 @@ fn crossing<Q: Quad>(
         }
         let step = at.g / at.slope;
         let newton = s - step;
-        if !(newton >= from && newton <= to) {
-            s = 0.5 * (from + to);
+        // Over the edges between texel cells Newton's method may go to and fro for ever.
+        if !(newton >= from && newton <= to && 2.0 * step.abs() <= last_step) {
+            last_step = 0.5 * (to - from);
+            s = from + last_step;
+            if last_step <= f64::EPSILON {
+                break;
+            }
             continue;
         }
         s = newton;
+        last_step = step.abs();
         if step.abs() * at.speed.max(1.0) <= FINE || to - from <= f64::EPSILON {
             break;
         }
