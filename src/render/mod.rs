@@ -16,7 +16,6 @@ mod ggx;
 mod integrator;
 mod light;
 mod material;
-mod offset;
 mod sampler;
 mod shading;
 mod tone;
@@ -27,7 +26,6 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub use integrator::RayCounts;
-pub use offset::RayOffset;
 pub use tone::to_srgb8;
 
 use crate::scene::{Camera, Film, Light, Material};

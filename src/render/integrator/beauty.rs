@@ -10,14 +10,13 @@ use glam::Vec3;
 
 use super::super::light::{InfiniteLight, prepare};
 use super::super::material::Bsdf;
-use super::super::offset::RayOffset;
 use super::super::sampler::{Dimension, Purpose, Sampler};
 use super::super::shading::ShadedPoint;
 use super::super::{RenderInput, Surfaces};
 use super::{Integrator, RayCounts};
 use crate::ray::Ray;
 use crate::scene::Material;
-use crate::trace::{Hit, Tracer};
+use crate::trace::{Hit, RayOffset, Tracer};
 
 /// Direct light and one reflection.
 pub struct Beauty<'a> {
