@@ -2,6 +2,7 @@
 
 use super::cluster::{Cluster, MOST_PRISMS, groups};
 use super::cull::Pairs;
+use super::detail::turned;
 use super::edits::EditBounds;
 use super::march::exact::{Found, Problem, root, search, walls};
 use super::ray_frame::{RayFrame, RayLanes, axes};
@@ -94,7 +95,15 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     }
     let (found, lane) = nearest?;
     let problem = prisms.problem(cluster, lane, interval, false);
-    Some(root::<L>(&problem, &found).to_hit(cluster.prim(lane)))
+    let hit = root::<L>(&problem, &found).to_hit(cluster.prim(lane));
+    if problem.spread == 0.0 {
+        return Some(hit);
+    }
+    // What is below the map's heights is inside, unless those go inward.
+    let outside = found.above == (prisms.surface.displacement().scale > 0.0);
+    let along = ray.direction.normalize();
+    let ng = turned(hit.ng, if outside { -along } else { along });
+    Some(PrismHit { ng, ..hit })
 }
 
 /// Whether a cluster is hit at all.
@@ -150,6 +159,7 @@ impl Prisms {
             lane,
             any,
             interval,
+            spread: self.spread(),
         }
     }
 }

@@ -10,6 +10,7 @@
 
 mod cells;
 mod children;
+mod lod;
 mod pieces;
 mod signs;
 mod span;
@@ -36,6 +37,8 @@ pub struct Problem<'a> {
     pub any: bool,
     /// The open interval of ray parameters.
     pub interval: [f32; 2],
+    /// Twice how far a hit may be off, as a part of its t; 0 where it must be exact.
+    pub spread: f32,
 }
 
 impl<'a> Problem<'a> {
@@ -67,6 +70,8 @@ pub struct Found {
     pub u: f64,
     /// Barycentric coordinate of vertex 2.
     pub v: f64,
+    /// Whether the ray comes from above.
+    pub above: bool,
 }
 
 /// The first crossing inside a prism, or any.
@@ -161,9 +166,18 @@ fn along<L: Lanes>(
     {
         return None;
     }
+    let mut caps = [None; 2];
+    if problem.spread > 0.0 && curve.is_wide {
+        caps = lod::caps(problem, stretch, &curve, ends);
+        if let Some(found) = lod::through(problem, &curve, caps) {
+            return problem.accepts(found.t).then_some(found);
+        }
+    }
     if problem.cluster.is_short(problem.lane) && pieces::is_even(&curve) {
         let mut signs = Signs::new(problem);
-        Walker::<L>::new(problem, &curve, view, ends).walk(&mut signs);
+        let mut walker = Walker::<L>::new(problem, &curve, view, ends);
+        walker.caps = caps;
+        walker.walk(&mut signs);
         return signs.nearest();
     }
     L::outline(Uneven {
@@ -227,7 +241,7 @@ impl<L: Lanes> Task<L> for OnSurface<'_> {
 
     #[inline(always)]
     fn run(self) -> Root {
-        let Found { t, u, v } = *self.found;
+        let Found { t, u, v, .. } = *self.found;
         let point = self.problem.patch().point(u, v);
         Root {
             t,

@@ -130,7 +130,17 @@ impl<'a> Signs<'a> {
             t: 0.0,
             u: 0.0,
             v: 0.0,
+            above: true,
         });
+        self.done = true;
+    }
+
+    /// Ends the search at a crossing, or without one where that is outside the ray's interval.
+    #[inline(always)]
+    pub fn end_with(&mut self, found: Found) {
+        if self.problem.accepts(found.t) {
+            self.nearest = Some(found);
+        }
         self.done = true;
     }
 
@@ -379,11 +389,6 @@ fn crossing<Q: Quad>(
             break;
         }
     }
-    let (place, depth) = curve.at(s);
-    let ([_, _, u, v], [_, z, zn, _]) = (place.to_array(), depth.to_array());
-    Found {
-        t: (z + curve.w(s) * zn) * curve.per_depth,
-        u,
-        v,
-    }
+    let [t, u, v] = curve.seen(s);
+    Found { t, u, v, above }
 }

@@ -17,6 +17,7 @@ use glam::{Vec3, Vec4};
 use super::Problem;
 use super::cells::{Chord, MOST_CELLS, NUDGE};
 use super::children::{Ends, Stack, at, of};
+use super::lod::settle;
 use super::signs::{Side, Signs};
 use crate::prism::curve::{Curve, View};
 use crate::prism::simd::{Grid, Lanes, Quad, Task};
@@ -56,6 +57,8 @@ pub struct Walker<'a, L: Lanes> {
     grid: Grid<'a>,
     /// Texel coordinates of the curve's origin, within one period of the map.
     base: [f32; 2],
+    /// Whether the curve's ends are above the surface, where that is known.
+    pub caps: [Option<bool>; 2],
 }
 
 /// What bounds a span of length 1 in its own parameter.
@@ -149,6 +152,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
             cut,
             time: [0.0; 4],
             interval: [0.0; 2],
+            caps: [None; 2],
         };
         if cut {
             walker.set_times([t0, t1]);
@@ -201,7 +205,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
         signs.count_span();
         let whole = [0.0, 1.0];
         let (alive, ends, bounds) = self.children(whole);
-        if alive == 0 {
+        if alive == 0 || self.settles(&ends, alive, whole, signs) {
             return;
         }
         let rest = self.visit(&ends, alive, &bounds, whole, signs);
@@ -245,12 +249,30 @@ impl<'a, L: Lanes> Walker<'a, L> {
             if alive == 0 {
                 continue;
             }
+            if self.settles(&ends, alive, span, signs) {
+                return;
+            }
             let rest = self.visit(&ends, alive, &bounds, span, signs);
             if signs.is_done() {
                 return;
             }
             stack.postpone(rest, ends.children, span);
         }
+    }
+
+    /// Whether level of detail ends the search here.
+    #[inline(always)]
+    fn settles(&self, ends: &Ends, alive: u32, span: [f32; 2], signs: &mut Signs<'_>) -> bool {
+        self.problem.spread > 0.0
+            && settle(
+                self.problem,
+                self.curve,
+                self.caps,
+                ends,
+                alive,
+                span,
+                signs,
+            )
     }
 
     /// The span from s = `from` to `to` in a parameter of its own.
@@ -299,6 +321,7 @@ impl<'a, L: Lanes> Walker<'a, L> {
             }
         }
         let mut alive = 0;
+        let (mut all_above, mut all_below) = (0, 0);
         let mut range = [zero; R];
         for r in 0..R {
             let (x1, y1, h1) = (next(&x, r), next(&y, r), next(&h, r));
@@ -317,6 +340,8 @@ impl<'a, L: Lanes> Walker<'a, L> {
             range[r] = high - low;
             let above = (high - (h[r].min(h1) - height_off)).sign_mask();
             let below = ((h[r].max(h1) + height_off) - low).sign_mask();
+            all_above |= above << (8 * r);
+            all_below |= below << (8 * r);
             let mut out = above | below;
             if self.cut {
                 let t1 = next(&t, r);
@@ -330,7 +355,8 @@ impl<'a, L: Lanes> Walker<'a, L> {
         if !(off + height_off).is_finite() {
             alive = 0;
         }
-        (alive, Ends::new(children, &x, &y, &h, &range))
+        let ends = Ends::new(children, &x, &y, &h, &range, [all_above, all_below]);
+        (alive, ends)
     }
 
     /// Goes through the children that are left and walks their cells, in order, up to the first that is too long or too bent;
