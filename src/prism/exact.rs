@@ -146,7 +146,7 @@ fn meeting<L: Lanes>(cluster: &Cluster, ray: &Ray, axes: [usize; 3]) -> u32 {
 
 impl Prisms {
     #[inline(always)]
-    fn problem<'a>(
+    pub(super) fn problem<'a>(
         &'a self,
         cluster: &'a Cluster,
         lane: usize,

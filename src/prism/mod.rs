@@ -13,6 +13,7 @@ mod curve;
 mod detail;
 mod edits;
 mod exact;
+mod explain;
 mod frame;
 #[allow(unsafe_code)] // SIMD stamps
 mod kernel;
@@ -42,6 +43,7 @@ use uniform::UniformPrisms;
 
 pub use detail::Lod;
 pub use edits::{BoundsChange, EditBounds};
+pub use explain::{CurvePoint, Explanation, Fate, SpanChild};
 pub use march::{March, MarchError, Step};
 pub use simd::SimdLevel;
 

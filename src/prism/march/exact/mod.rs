@@ -10,6 +10,7 @@
 
 mod cells;
 mod children;
+mod explain;
 mod lod;
 mod pieces;
 mod signs;
@@ -22,6 +23,7 @@ use crate::prism::curve::{Curve, Cut, Stretch, View};
 use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::{Lanes, Quad, Task};
 use crate::surface::{DisplacedSurface, Patch};
+pub use explain::explain;
 use pieces::Piece;
 use signs::Signs;
 use span::Walker;

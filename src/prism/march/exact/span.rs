@@ -12,6 +12,8 @@
 //! |k''|/2 <= K2 = |n1-n0| M_u + |n2-n0| M_v + K1^2/(2 k_min), so |h''|/2 <= |w| K2 + |dw| K1.
 //! To these come the roundings of the f32 evaluation: at most 8 units of the sum of magnitudes that each value is made of.
 
+mod record;
+
 use glam::{Vec3, Vec4};
 
 use super::Problem;
