@@ -90,6 +90,7 @@ fn main() {
         let options = PrismOptions {
             march: March::Exact,
             edit_bounds,
+            ..PrismOptions::default()
         };
         let prisms = Arc::new(Prisms::new(surface.clone(), options).expect("no step"));
         let world = World::new(vec![Object {

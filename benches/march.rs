@@ -11,14 +11,15 @@ use std::sync::Arc;
 
 use common::boulder;
 use common::rays::Rays;
-use common::scene::{prisms, uniform};
+use common::scene::{displaced, uniform};
 use common::timing::{RayTimes, option};
 use prismarch::embree::{EmbreeOptions, EmbreeTracer};
-use prismarch::prism::{March, SimdLevel};
+use prismarch::prism::{Lod, March, PrismOptions, Prisms, SimdLevel};
 use prismarch::trace::{Object, Placement, Shape, World};
 
 struct Contestant {
     march: March,
+    lod: Option<f32>,
     simd: SimdLevel,
     tracer: EmbreeTracer,
     rays: Rays,
@@ -35,15 +36,31 @@ fn main() {
     let mesh = boulder::mesh(option("--cells", 8), map.size().0);
 
     let mut contestants = Vec::new();
-    let marches = [March::Exact, uniform(1.0), uniform(4.0)];
-    for march in marches.into_iter().take(option("--marches", 3)) {
+    // Level of detail for pixels of so many times the size: as in a picture of so much fewer.
+    let marches = [
+        (March::Exact, None),
+        (uniform(1.0), None),
+        (uniform(4.0), None),
+        (March::Exact, Some(1.0)),
+        (March::Exact, Some(8.0)),
+        (March::Exact, Some(64.0)),
+    ];
+    let surface = displaced(&mesh, &map);
+    for (march, lod) in marches.into_iter().take(option("--marches", 6)) {
         for simd in [SimdLevel::Avx2, SimdLevel::Baseline]
             .into_iter()
             .take(option("--levels", 2))
         {
-            let Some(prisms) = prisms(&mesh, &map, march).with_simd(simd) else {
+            let options = PrismOptions {
+                march,
+                lod: if lod.is_some() { Lod::Cone } else { Lod::Off },
+                ..PrismOptions::default()
+            };
+            let prisms = Prisms::new(surface.clone(), options).expect("a step above zero");
+            let Some(prisms) = prisms.with_simd(simd) else {
                 continue;
             };
+            prisms.set_spread(lod.unwrap_or(0.0) * Rays::pixel_spread(size));
             let world = World::new(vec![Object {
                 shape: Shape::Displaced(Arc::new(prisms)),
                 placement: Placement::World,
@@ -53,6 +70,7 @@ fn main() {
                 .expect("Embree builds the sphere");
             contestants.push(Contestant {
                 march,
+                lod,
                 simd,
                 rays: Rays::new(size, &tracer),
                 tracer,
@@ -74,7 +92,7 @@ fn main() {
         for (times, threads) in contestant.times.iter().zip(THREADS) {
             println!(
                 "| {} | {} | {threads} | {} |",
-                name(contestant.march),
+                name(contestant.march, contestant.lod),
                 contestant.simd.name(),
                 times.cells(&contestant.rays),
             );
@@ -82,9 +100,10 @@ fn main() {
     }
 }
 
-fn name(march: March) -> String {
-    match march {
-        March::Exact => "exact".to_owned(),
-        March::Uniform { step, .. } => format!("uniform, {step:?}"),
+fn name(march: March, lod: Option<f32>) -> String {
+    match (march, lod) {
+        (March::Exact, None) => "exact".to_owned(),
+        (March::Exact, Some(pixels)) => format!("exact, lod of {pixels} pixels"),
+        (March::Uniform { step, .. }, _) => format!("uniform, {step:?}"),
     }
 }

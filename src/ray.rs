@@ -1,9 +1,11 @@
 //! The words every room shares: a ray, eight of them, and an axis-aligned box.
 
+mod cone;
 mod packet;
 
 use glam::Vec3;
 
+pub use cone::{Cone, Footprint};
 pub use packet::{RayPacket, lanes_of};
 
 /// A ray `origin + t * direction` for `t` in (`tnear`, `tfar`).

@@ -68,6 +68,8 @@ fn help_names_verbs_options_and_examples() {
                 "--march",
                 "--dt",
                 "--dt-world",
+                "--lod",
+                "--spread",
             ],
         ),
         (
@@ -83,6 +85,8 @@ fn help_names_verbs_options_and_examples() {
                 "--dt",
                 "--dt-world",
                 "--jitter",
+                "--lod",
+                "--spread",
                 "--rays",
                 "--output",
             ],
@@ -292,6 +296,40 @@ fn the_command_line_wins_over_the_scenes_march() {
     assert_ne!(steps, exact);
     assert_eq!(picture(&["--march", "uniform"]), steps);
     assert_ne!(picture(&["--dt", "0.25"]), steps);
+    // Level of detail: off is exact, and needs the exact march.
+    let exact = ["--march", "exact"];
+    let lod = |options: &[&str]| picture(&[&exact, options].concat());
+    assert_eq!(lod(&["--lod", "off"]), picture(&exact));
+    assert_eq!(lod(&["--lod", "cone", "--spread", "0"]), picture(&exact));
+    assert_ne!(lod(&["--lod", "cone"]), picture(&exact));
+    let refused = folder.run(&["render", "scene.toml", "--lod", "cone", "-o", "a.exr"]);
+    assert!(
+        stderr(&refused).contains("level of detail"),
+        "{}",
+        stderr(&refused)
+    );
+}
+
+#[test]
+fn level_of_detail_of_a_scene_needs_the_exact_march() {
+    let folder = Folder::with_quad();
+    let picture = |keys: &str| {
+        folder.put(
+            "scene.toml",
+            SCENE.replace("scale = 0.2", &format!("scale = 0.2\n{keys}")),
+        );
+        folder.run(&["render", "scene.toml", "-o", "a.png", "--quiet"])
+    };
+    for keys in ["lod = \"cone\"", "lod = \"off\"\ndt = 1"] {
+        assert!(picture(keys).status.success(), "{keys}");
+    }
+    let refused = picture("lod = \"cone\"\ndt = 1");
+    assert!(!refused.status.success());
+    let message = stderr(&refused);
+    assert!(
+        message.contains("scene.toml:12") && message.contains("lod"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -46,6 +46,7 @@ impl Stage {
             let options = PrismOptions {
                 march: March::Exact,
                 edit_bounds,
+                ..PrismOptions::default()
             };
             let prisms = Prisms::new(Arc::new(surface.unwrap()), options).unwrap();
             Shape::Displaced(Arc::new(prisms))

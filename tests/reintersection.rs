@@ -1,7 +1,7 @@
 //! Rays that leave a hit neither meet it again nor slip through it, at any scale and any place.
 //!
 //! In the spirit of pbrt-v4's shapes_test.cpp: random shapes with random exponents of scale and distance from the
-//! origin. Rays start where the renderer starts them. What happens within a few offsets of the hit is looked at: on
+//! origin. Rays start where `RayOffset` puts them. What happens within a few offsets of the hit is looked at: on
 //! the normal's side there is nothing, on the other side the surface. Where the map or the mesh has a crease that
 //! close the oracle decides; that is rare.
 #![cfg(any(feature = "embree", feature = "bvh"))]
@@ -24,9 +24,8 @@ use glam::{Affine3A, Quat, Vec3};
 use oracle::{EDGE, Line, Oracle};
 use prismarch::prism::Prisms;
 use prismarch::ray::Ray;
-use prismarch::render::RayOffset;
 use prismarch::surface::{DisplacedSurface, Wrap};
-use prismarch::trace::{Object, Placement, Shape, Tracer, World};
+use prismarch::trace::{Object, Placement, RayOffset, Shape, Tracer, World};
 
 const SHAPES: usize = if cfg!(debug_assertions) { 12 } else { 60 };
 const HITS: usize = if cfg!(debug_assertions) { 40 } else { 400 };

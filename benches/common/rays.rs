@@ -24,6 +24,11 @@ pub struct Rays {
 }
 
 impl Rays {
+    /// The angle of one of `size` x `size` pixels.
+    pub fn pixel_spread(size: u32) -> f32 {
+        2.0 * HALF_WIDTH / size as f32
+    }
+
     /// The rays for `size` x `size` pixels; `tracer` finds where secondary rays start.
     ///
     /// # Panics
@@ -57,9 +62,11 @@ impl Rays {
     }
 }
 
+/// Of the film, at distance 1.
+const HALF_WIDTH: f32 = 0.401;
+
 fn primary(size: u32) -> Vec<Ray> {
     const EYE: Vec3 = Vec3::new(0.3, -2.9, 0.8);
-    const HALF_WIDTH: f32 = 0.401;
     let forward = -EYE.normalize();
     let right = forward.cross(Vec3::Z).normalize();
     let up = right.cross(forward);

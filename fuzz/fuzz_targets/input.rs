@@ -140,7 +140,11 @@ impl Input<'_> {
             _ => March::Exact,
         };
         let edit_bounds = [EditBounds::Tight, EditBounds::Range][usize::from(self.byte() % 2)];
-        PrismOptions { march, edit_bounds }
+        PrismOptions {
+            march,
+            edit_bounds,
+            ..PrismOptions::default()
+        }
     }
 
     pub fn ray(&mut self) -> Ray {

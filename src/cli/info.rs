@@ -209,6 +209,9 @@ impl Memory {
         row("BVH", self.common.bvh)?;
         row("overhead: prisms", self.overhead.prisms)?;
         row("overhead: pyramids of maps", self.overhead.pyramids)?;
+        if self.overhead.means > 0 {
+            row("overhead: means of maps (lod)", self.overhead.means)?;
+        }
         row("total", self.total)?;
         let pictures = Bytes(self.pictures);
         writeln!(

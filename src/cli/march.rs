@@ -4,7 +4,7 @@ use clap::ValueEnum;
 
 use super::error::CliError;
 use super::parse;
-use crate::prism::{March, Step};
+use crate::prism::{Lod, March, Step};
 use crate::scene::{ObjectShape, Scene};
 
 /// What is taken instead of the scene's marches.
@@ -19,6 +19,12 @@ pub struct MarchArgs {
     /// Step of the uniform march in world units
     #[arg(long, value_name = "LENGTH", value_parser = parse::length, conflicts_with = "dt")]
     dt_world: Option<f32>,
+    /// Level of detail: "cone" lets a hit be off by half a pixel and shades with the mean over one [default: the scene's, or off]
+    #[arg(long, value_enum)]
+    lod: Option<LodKind>,
+    /// Angle of one pixel for --lod cone, radians: the growth of a ray's cone per unit of length [default: the camera's]
+    #[arg(long, value_name = "RADIANS", value_parser = parse::spread)]
+    spread: Option<f32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -29,9 +35,39 @@ enum MarchKind {
     Uniform,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LodKind {
+    /// Every hit is exact
+    Off,
+    /// Half a pixel is as good
+    Cone,
+}
+
+impl From<LodKind> for Lod {
+    fn from(kind: LodKind) -> Self {
+        match kind {
+            LodKind::Off => Self::Off,
+            LodKind::Cone => Self::Cone,
+        }
+    }
+}
+
 impl MarchArgs {
+    /// The angle of a pixel if one is given here, else the scene's camera's.
+    pub fn spread(&self, scene: &Scene) -> f32 {
+        let camera = scene.camera.pixel_spread(scene.film.height);
+        self.spread.unwrap_or(camera)
+    }
+
     /// What is said here wins over the scene; `jitter` asks for jittered steps, and so for steps.
     pub fn apply(&self, scene: &mut Scene, jitter: bool) -> Result<(), CliError> {
+        if let Some(lod) = self.lod {
+            for object in &mut scene.objects {
+                if let ObjectShape::Displaced(_, options) = &mut object.shape {
+                    options.lod = lod.into();
+                }
+            }
+        }
         let step_here = match (self.dt, self.dt_world) {
             (Some(texels), _) => Some(Step::Texels(texels)),
             (None, Some(length)) => Some(Step::World(length)),

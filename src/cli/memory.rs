@@ -38,13 +38,15 @@ pub struct Overhead {
     pub prisms: usize,
     /// Min/max pyramids of displacement maps.
     pub pyramids: usize,
+    /// Means of displacement maps, for level of detail.
+    pub means: usize,
 }
 
 impl Memory {
     /// Adds up a built scene; what is shared counts once.
     pub fn of(loaded: &Loaded, world: &World, tracer: &dyn Tracer) -> Self {
         let common = Common {
-            maps: map_bytes(loaded) - pyramid_bytes(loaded),
+            maps: map_bytes(loaded) - pyramid_bytes(loaded) - mean_bytes(loaded),
             meshes: mesh_bytes(loaded),
             bvh: tracer.bvh_bytes(),
         };
@@ -55,8 +57,9 @@ impl Memory {
         let overhead = Overhead {
             prisms: prisms.sum(),
             pyramids: pyramid_bytes(loaded),
+            means: mean_bytes(loaded),
         };
-        let added = overhead.prisms + overhead.pyramids;
+        let added = overhead.prisms + overhead.pyramids + overhead.means;
         let total = common.maps + common.meshes + common.bvh + added;
         Self {
             // Not 0: a scene has a mesh.
@@ -75,6 +78,10 @@ fn map_bytes(loaded: &Loaded) -> usize {
 
 fn pyramid_bytes(loaded: &Loaded) -> usize {
     loaded.maps.iter().map(|m| m.map.pyramid().bytes()).sum()
+}
+
+fn mean_bytes(loaded: &Loaded) -> usize {
+    loaded.maps.iter().map(|m| m.map.mean_bytes()).sum()
 }
 
 fn mesh_bytes(loaded: &Loaded) -> usize {

@@ -47,6 +47,12 @@ pub fn texels(text: &str) -> Result<f32, String> {
     })
 }
 
+/// The angle of a pixel.
+pub fn spread(text: &str) -> Result<f32, String> {
+    let number = finite(text).ok().filter(|x| (0.0..=1.0).contains(x));
+    number.ok_or_else(|| "expected radians from 0 to 1".into())
+}
+
 /// A length above zero.
 pub fn length(text: &str) -> Result<f32, String> {
     let number = finite(text).ok().filter(|&x| x > 0.0);

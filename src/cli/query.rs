@@ -15,6 +15,7 @@ use super::parse;
 use super::rays::{Layout, RayError, RayReader, Row};
 use crate::image::{Channel, atomic};
 use crate::prism::PrismOptions;
+use crate::ray::Cone;
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
 use crate::surface::{DisplacedSurface, Displacement, Projection, Seams, UvTransform, Wrap};
 use crate::trace::World;
@@ -155,11 +156,14 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     args.march.apply(&mut loaded.scene, args.jitter.is_some())?;
     args.override_seams(&mut loaded.scene);
     let world = loaded.scene.world()?;
+    let spread = args.march.spread(&loaded.scene);
+    world.set_spread(spread);
     let engine = args.engine.build(&world)?;
     let query = Query {
         world: &world,
         engine: &*engine,
         seed: args.jitter.unwrap_or(0),
+        cone: Cone::from_eye(spread),
     };
     if to_stdout {
         let mut out = BufWriter::new(io::stdout().lock());
@@ -232,6 +236,7 @@ struct Query<'a> {
     world: &'a World,
     engine: &'a dyn Engine,
     seed: u32,
+    cone: Cone,
 }
 
 /// Why a table of hits ends early.
@@ -282,7 +287,10 @@ impl Query<'_> {
         for (row, number) in rows.iter().zip(first..) {
             let mut ray = layout.ray(row)?;
             ray.key = key(self.seed, number);
-            hits::append(&mut table, self.world, tracer.intersect(&ray).as_ref());
+            match tracer.intersect(&ray) {
+                Some(hit) => hits::append(&mut table, self.world, &hit, &ray, &self.cone),
+                None => hits::append_miss(&mut table),
+            }
         }
         Ok(table)
     }

@@ -28,6 +28,7 @@ Examples:
   prismarch render scene.toml
   prismarch render scene.toml -o rock.exr --size 1920x1080 --spp 256
   prismarch render scene.toml --march uniform --dt 0.5
+  prismarch render scene.toml --lod cone --spp 1
   prismarch render scene.toml --backend bvh --threads 4 --stats stats.json --quiet")]
 pub struct Args {
     /// Scene file (TOML)
@@ -116,6 +117,7 @@ impl Job<'_> {
         self.march.apply(&mut loaded.scene, false)?;
         let load = clock.lap();
         let world = loaded.scene.world()?;
+        world.set_spread(self.march.spread(&loaded.scene));
         let engine = self.engine.build(&world)?;
         let build = clock.lap();
         let picture = self.render(&loaded, &world, &*engine);

@@ -444,6 +444,14 @@ impl<Q: Quad> Curve<Q> {
         (place / area, depth / area)
     }
 
+    /// Ray parameter and barycentric coordinates of vertices 1 and 2 at s.
+    #[inline(always)]
+    pub fn seen(&self, s: f64) -> [f64; 3] {
+        let (place, depth) = self.at(s);
+        let ([_, _, u, v], [_, z, zn, _]) = (place.to_array(), depth.to_array());
+        [(z + self.w(s) * zn) * self.per_depth, u, v]
+    }
+
     /// w at s.
     #[inline(always)]
     pub fn w(&self, s: f64) -> f64 {

@@ -1,6 +1,7 @@
 //! Prisms for the exact march: clusters of eight, and the hit test of one cluster.
 
 use super::cluster::{Cluster, MOST_PRISMS, groups};
+use super::detail::turned;
 use super::edits::EditBounds;
 use super::march::exact::{
     Arcs, Found, FoundArcs, Problem, Search, Units, root, search_arc, walls,
@@ -80,7 +81,8 @@ impl<'a> Meeting<'a> {
         let units = Units::new(&prisms.surface);
         let (arcs, found) =
             Arcs::seen(&sight, met, cluster.texcoord_lanes(), normals, &units, &ray);
-        let others = if ray.is_usual {
+        // Level of detail is decided on curves of f64.
+        let others = if ray.is_usual && prisms.spread() == 0.0 {
             found.others | met & cluster.folded::<L>()
         } else {
             met
@@ -113,13 +115,7 @@ impl<'a> Meeting<'a> {
 
     #[inline(always)]
     fn problem(&self, lane: usize, interval: [f32; 2], any: bool) -> Problem<'_> {
-        Problem {
-            surface: &self.prisms.surface,
-            cluster: self.cluster,
-            lane,
-            any,
-            interval,
-        }
+        self.prisms.problem(self.cluster, lane, interval, any)
     }
 }
 
@@ -162,7 +158,15 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     }
     let (found, lane) = nearest?;
     let problem = meeting.problem(lane, interval, false);
-    Some(root::<L>(&problem, &found).to_hit(cluster.prim(lane)))
+    let hit = root::<L>(&problem, &found).to_hit(cluster.prim(lane));
+    if problem.spread == 0.0 {
+        return Some(hit);
+    }
+    // What is below the map's heights is inside, unless those go inward.
+    let outside = found.above == (prisms.surface.displacement().scale > 0.0);
+    let along = ray.direction.normalize();
+    let ng = turned(hit.ng, if outside { -along } else { along });
+    Some(PrismHit { ng, ..hit })
 }
 
 /// Whether a cluster is hit at all.
@@ -183,4 +187,24 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
         }
     }
     false
+}
+
+impl Prisms {
+    #[inline(always)]
+    pub(super) fn problem<'a>(
+        &'a self,
+        cluster: &'a Cluster,
+        lane: usize,
+        interval: [f32; 2],
+        any: bool,
+    ) -> Problem<'a> {
+        Problem {
+            surface: &self.surface,
+            cluster,
+            lane,
+            any,
+            interval,
+            spread: self.spread(),
+        }
+    }
 }

@@ -9,8 +9,10 @@
 
 mod cluster;
 mod curve;
+mod detail;
 mod edits;
 mod exact;
+mod explain;
 mod frame;
 #[allow(unsafe_code)] // SIMD stamps
 mod kernel;
@@ -29,17 +31,19 @@ mod touch;
 mod uniform;
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU32, AtomicU64};
 
 use glam::{DVec3, Vec3};
 
 use crate::ray::{Aabb, Ray};
-use crate::surface::{DisplacedSurface, Seams, SurfacePoint};
+use crate::surface::{ChartEdges, DisplacedSurface, Seams, SurfacePoint};
 use exact::ExactPrisms;
 use kernel::Kernel;
 use uniform::UniformPrisms;
 
+pub use detail::Lod;
 pub use edits::{BoundsChange, EditBounds};
+pub use explain::{CurvePoint, Explanation, Fate, SpanChild};
 pub use march::{March, MarchError, Step};
 pub use simd::SimdLevel;
 
@@ -75,6 +79,11 @@ pub struct Prisms {
     edit_bounds: EditBounds,
     /// Heights for which every prism has room.
     room: Option<(f32, f32)>,
+    lod: Lod,
+    /// What means must not reach across; only where there is level of detail.
+    charts: Option<ChartEdges>,
+    /// Bits of [`Self::spread`].
+    spread: AtomicU32,
     /// Edits so far that made bounds grow.
     growths: AtomicU64,
 }
@@ -86,14 +95,16 @@ pub struct PrismOptions {
     pub march: March,
     /// How much room they have for edits of the map.
     pub edit_bounds: EditBounds,
+    /// Whether hits may be off by what a pixel does not show: the exact march only.
+    pub lod: Lod,
 }
 
 impl From<March> for PrismOptions {
-    /// With [tight](EditBounds::Tight) bounds.
+    /// With [tight](EditBounds::Tight) bounds and no level of detail.
     fn from(march: March) -> Self {
         Self {
             march,
-            edit_bounds: EditBounds::default(),
+            ..Self::default()
         }
     }
 }
@@ -109,13 +120,17 @@ impl Prisms {
     ///
     /// # Errors
     ///
-    /// A step that is no positive number; closed [`Seams`] with the uniform march; more base triangles than the exact
+    /// A step that is no positive number; closed [`Seams`] or [`Lod::Cone`] with the uniform march; more base triangles than the exact
     /// march can number (2^27).
     pub fn new(
         surface: Arc<DisplacedSurface>,
         options: impl Into<PrismOptions>,
     ) -> Result<Self, MarchError> {
-        let PrismOptions { march, edit_bounds } = options.into();
+        let PrismOptions {
+            march,
+            edit_bounds,
+            lod,
+        } = options.into();
         let march = march.validate()?;
         let room = edit_bounds.room(surface.map());
         let parts = match march {
@@ -123,9 +138,16 @@ impl Prisms {
             March::Uniform { .. } if surface.seams() == Seams::Closed => {
                 return Err(MarchError::SeamsNeedExact);
             }
+            March::Uniform { .. } if lod == Lod::Cone => return Err(MarchError::LodNeedsExact),
             March::Uniform { .. } => Parts::Uniform(UniformPrisms::new(&surface, edit_bounds)),
         };
+        if lod == Lod::Cone {
+            surface.map().build_means();
+        }
         Ok(Self {
+            lod,
+            charts: (lod == Lod::Cone).then(|| surface.chart_edges()),
+            spread: AtomicU32::new(0),
             surface,
             parts,
             march,
@@ -175,14 +197,15 @@ impl Prisms {
         self.len() == 0
     }
 
-    /// Bytes beside mesh and map: 108 per base triangle (the exact march's go in groups of eight), and 28 per wall where
-    /// seams are closed.
+    /// Bytes beside mesh and map: 108 per base triangle (the exact march's go in groups of eight), 28 per wall where
+    /// seams are closed, and 1 per base triangle for level of detail.
     pub fn bytes(&self) -> usize {
         let prisms = match &self.parts {
             Parts::Exact(exact) => size_of_val(&exact.clusters[..]),
             Parts::Uniform(uniform) => size_of_val(&uniform.records[..]),
         };
-        prisms + size_of_val(self.surface.walls())
+        let charts = self.charts.as_ref().map_or(0, ChartEdges::bytes);
+        prisms + size_of_val(self.surface.walls()) + charts
     }
 
     /// Conservative bounds of what one traced primitive holds of the surface.
@@ -258,6 +281,7 @@ impl Prisms {
             shading_normal: normal::smooth(&patch, bu, bv).as_vec3(),
             texcoord: st0 + u * (st1 - st0) + v * (st2 - st0),
             displacement: point.displacement as f32,
+            tolerance: 0.0,
         }
     }
 }

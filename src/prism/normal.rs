@@ -1,6 +1,6 @@
 //! Shading normals of the displaced surface.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::surface::Patch;
 
@@ -10,27 +10,39 @@ use crate::surface::Patch;
 /// N' is the normal of the face displaced along Ng, taken analytically: Ng - grad D, normalised, with D's gradient
 /// in the face's plane from the map's gradient without jumps at texel borders.
 pub fn smooth(patch: &Patch<'_>, u: f64, v: f64) -> DVec3 {
-    let [v0, v1, v2] = patch.vertices;
-    let (e1, e2) = (v1 - v0, v2 - v0);
+    smooth_by(patch, patch.map.smooth_gradient(patch.texel(u, v)), u, v)
+}
+
+/// The same for another gradient of the map, in heights per texel.
+pub fn smooth_by(patch: &Patch<'_>, gradient: DVec2, u: f64, v: f64) -> DVec3 {
     let face = patch.face_normal();
-    let by_texel = patch.scale * patch.map.smooth_gradient(patch.texel(u, v));
-    let (d1, d2) = (
-        by_texel.dot(patch.texels[1] - patch.texels[0]),
-        by_texel.dot(patch.texels[2] - patch.texels[0]),
-    );
-    // The gradient g in the plane has g . e1 = d1 and g . e2 = d2: the dual basis.
-    let dual = |edge: DVec3| edge.cross(face) / e1.cross(e2).dot(face);
-    let gradient = d1 * dual(e2) - d2 * dual(e1);
-    let displaced = (face - gradient).normalize();
+    let by_texel = patch.scale * gradient;
+    let change = [1, 2].map(|k| by_texel.dot(patch.texels[k] - patch.texels[0]));
+    let displaced = (face - in_plane(patch, change)).normalize();
     let smooth = patch.normal(u, v).normalize();
     (smooth - face + displaced).normalize_or(displaced)
+}
+
+/// The gradient g in the face's plane of what changes by these amounts along both edges from corner 0: g . e1 = d1 and g . e2 = d2, by
+/// the dual basis.
+pub fn in_plane(patch: &Patch<'_>, [d1, d2]: [f64; 2]) -> DVec3 {
+    let [dual1, dual2] = dual_edges(patch);
+    d1 * dual1 + d2 * dual2
+}
+
+/// The vectors in the face's plane along which u and v change by their lengths: those of [`in_plane`].
+pub fn dual_edges(patch: &Patch<'_>) -> [DVec3; 2] {
+    let [v0, v1, v2] = patch.vertices;
+    let (e1, e2) = (v1 - v0, v2 - v0);
+    let normal = e1.cross(e2);
+    let scaled = normal / normal.length_squared();
+    [e2.cross(scaled), scaled.cross(e1)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::surface::{DisplacementMap, Texels, Wrap};
-    use glam::DVec2;
 
     fn patch(map: &DisplacementMap, normals: [DVec3; 3]) -> Patch<'_> {
         Patch {

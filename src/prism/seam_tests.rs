@@ -218,6 +218,7 @@ fn tied(prisms: &Prisms, ray: &Ray, t: f32) -> usize {
     for (index, cluster) in exact.clusters.iter().enumerate() {
         for lane in 0..exact.len(index) {
             let problem = Problem {
+                spread: 0.0,
                 surface: &prisms.surface,
                 cluster,
                 lane,

@@ -16,7 +16,6 @@ mod ggx;
 mod integrator;
 mod light;
 mod material;
-mod offset;
 mod sampler;
 mod shading;
 mod tone;
@@ -27,9 +26,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub use integrator::RayCounts;
-pub use offset::RayOffset;
 pub use tone::to_srgb8;
 
+use crate::ray::{Cone, Ray};
 use crate::scene::{Camera, Film, Light, Material};
 use crate::surface::SurfacePoint;
 use crate::trace::{Hit, Tracer, World};
@@ -43,16 +42,16 @@ const TILE: u32 = 32;
 
 /// What the renderer asks of a hit.
 pub trait Surfaces: Sync {
-    /// The surface there, in world space.
-    fn point(&self, hit: &Hit) -> SurfacePoint;
+    /// The surface there in world space, as the cone around `ray` sees it, which made the hit.
+    fn point(&self, hit: &Hit, ray: &Ray, cone: &Cone) -> SurfacePoint;
 
     /// Index of the object that was hit.
     fn object(&self, hit: &Hit) -> usize;
 }
 
 impl Surfaces for World {
-    fn point(&self, hit: &Hit) -> SurfacePoint {
-        self.surface_point(hit)
+    fn point(&self, hit: &Hit, ray: &Ray, cone: &Cone) -> SurfacePoint {
+        self.seen_point(hit, ray, cone)
     }
 
     fn object(&self, hit: &Hit) -> usize {

@@ -17,6 +17,8 @@ pub struct ShadedPoint {
     pub position: Vec3,
     /// Unit geometric normal on the viewer's side.
     pub geometric_normal: Vec3,
+    /// See [`SurfacePoint::tolerance`].
+    pub tolerance: f32,
     basis: Basis,
     /// Cosine between both normals.
     alignment: f32,
@@ -39,6 +41,7 @@ impl ShadedPoint {
         Self {
             position: point.position,
             geometric_normal: geometric,
+            tolerance: point.tolerance,
             basis,
             alignment: shading.dot(geometric),
             to_viewer: basis.to_local(to_viewer),
@@ -121,6 +124,7 @@ mod tests {
             shading_normal: shading.normalize(),
             texcoord: Vec2::ZERO,
             displacement: 0.0,
+            tolerance: 0.0,
         }
     }
 

@@ -81,7 +81,7 @@ impl Tracer for Shapes {
 }
 
 impl Surfaces for Shapes {
-    fn point(&self, hit: &Hit) -> SurfacePoint {
+    fn point(&self, hit: &Hit, _: &Ray, _: &Cone) -> SurfacePoint {
         let position = Vec3::new(hit.u, f32::from_bits(hit.prim), hit.v);
         SurfacePoint {
             position,
@@ -90,6 +90,7 @@ impl Surfaces for Shapes {
             shading_normal: hit.ng.normalize(),
             texcoord: Vec2::ZERO,
             displacement: 0.0,
+            tolerance: 0.0,
         }
     }
 

@@ -34,6 +34,13 @@ pub struct Camera {
     pub fov: f32,
 }
 
+impl Camera {
+    /// The angle of one of `height` rows of pixels, radians, in the middle of the picture: the spread of the cone around a camera ray.
+    pub fn pixel_spread(&self, height: u32) -> f32 {
+        2.0 * (0.5 * self.fov).tan() / height as f32
+    }
+}
+
 /// How linear radiance becomes an 8-bit picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]

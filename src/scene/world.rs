@@ -9,14 +9,18 @@ use crate::prism::{MarchError, Prisms};
 use crate::trace::{Object, Placement, Shape, World};
 
 impl Scene {
-    /// The world of this scene; object k of the world is object k of the scene. Builds the prisms, in parallel.
+    /// The world of this scene; object k of the world is object k of the scene. Builds the prisms, in parallel, with
+    /// the spread of the camera's pixels for level of detail.
     ///
     /// # Errors
     ///
-    /// A march whose step is no positive number; what is loaded from a file never has one.
+    /// A march whose step is no positive number, or level of detail without the exact march; what is loaded from a file
+    /// never has either.
     pub fn world(&self) -> Result<World, MarchError> {
-        let objects: Result<_, _> = self.objects.par_iter().map(SceneObject::traced).collect();
-        objects.map(World::new)
+        let objects: Result<Vec<_>, _> = self.objects.par_iter().map(SceneObject::traced).collect();
+        let world = World::new(objects?);
+        world.set_spread(self.camera.pixel_spread(self.film.height));
+        Ok(world)
     }
 }
 

@@ -80,6 +80,9 @@ pub struct SurfacePoint {
     pub texcoord: Vec2,
     /// D, world units along the unit interpolated normal.
     pub displacement: f32,
+    /// How far, along the ray that was asked about, the point may be from the first one that the ray meets; 0 but where there is level of
+    /// detail. Rays that leave the point start as much further off the surface, so that they do not meet what was left out.
+    pub tolerance: f32,
 }
 
 impl DisplacedSurface {

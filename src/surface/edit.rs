@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::PoisonError;
 
-use super::texels::{StoredTexels, Texel, repeated};
+use super::texels::{StoredTexels, Texel};
 use super::{DisplacementMap, MapError, Texels};
 
 /// A rectangle of texels of a map.
@@ -43,7 +43,7 @@ pub struct Update {
 
 impl DisplacementMap {
     /// Replaces the texels of `rect` by `texels` of the map's own kind, rows from the bottom, and brings the pyramid
-    /// up to date, in time proportional to the rectangle. Nothing is changed where an error is returned.
+    /// and the means up to date, in time proportional to the rectangle. Nothing is changed where an error is returned.
     ///
     /// The map may be in use: an edit while rays are in flight is memory-safe, and a ray sees each texel, and each
     /// entry of the pyramid, either as it was or as it is, so it may miss what is half edited. For a consistent
@@ -80,18 +80,16 @@ impl DisplacementMap {
         // The lock guards no data of its own that a panic could have spoilt.
         let _alone = self.editing.lock().unwrap_or_else(PoisonError::into_inner);
         let range_before = self.range();
-        match (&self.texels, texels) {
-            (StoredTexels::U8(to), Texels::U8(from)) => self.write(to, from, rect),
-            (StoredTexels::U16(to), Texels::U16(from)) => self.write(to, from, rect),
-            (StoredTexels::F32(to), Texels::F32(from)) => self.write(to, from, rect),
-            _ => unreachable!("the kinds were found equal"),
-        }
+        self.grid.write(texels, rect);
         let columns = (rect.x, rect.x + rect.width - 1);
         let rows = (rect.y, rect.y + rect.height - 1);
         self.pyramid.update(columns, rows, |j, i, out| {
             let start = j * self.stride() + i;
-            self.texels.copy(start, out);
+            self.grid.texels.copy(start, out);
         });
+        if let Some(means) = self.means.get() {
+            means.update(&self.grid, rect);
+        }
         Ok(Update {
             range_before,
             range_after: self.range(),
@@ -105,7 +103,7 @@ impl DisplacementMap {
     /// [`MapError::EmptyRect`] and [`MapError::RectOutside`].
     pub fn read(&self, rect: TexelRect) -> Result<Texels, MapError> {
         self.check(rect)?;
-        Ok(match &self.texels {
+        Ok(match &self.grid.texels {
             StoredTexels::U8(t) => Texels::U8(self.gather(t, rect)),
             StoredTexels::U16(t) => Texels::U16(self.gather(t, rect)),
             StoredTexels::F32(t) => Texels::F32(self.gather(t, rect)),
@@ -121,7 +119,7 @@ impl DisplacementMap {
         self.check(rect)?;
         let row = |j: usize| {
             let start = j * self.stride() + rect.x;
-            self.texels.range(start..start + rect.width)
+            self.grid.texels.range(start..start + rect.width)
         };
         let rows = (rect.y..rect.y + rect.height).filter_map(row);
         let (low, high) = rows
@@ -144,28 +142,6 @@ impl DisplacementMap {
             width,
             height,
         })
-    }
-
-    /// Stores `from` and, where it is at an edge that is stored twice, its copies.
-    fn write<T: Texel>(&self, to: &[T::Atomic], from: &[T], rect: TexelRect) {
-        let (width, height) = self.size();
-        let copied_column = repeated(self.wrap(), width).checked_sub(rect.x);
-        let copied_row = repeated(self.wrap(), height);
-        let write_row = |j: usize, from: &[T]| {
-            let row = &to[j * self.stride()..(j + 1) * self.stride()];
-            for (&h, to) in from.iter().zip(&row[rect.x..]) {
-                h.store(to);
-            }
-            if let Some(&h) = copied_column.and_then(|i| from.get(i)) {
-                h.store(&row[width]);
-            }
-        };
-        for (j, from) in (rect.y..).zip(from.chunks_exact(rect.width)) {
-            write_row(j, from);
-            if j == copied_row {
-                write_row(height, from);
-            }
-        }
     }
 
     fn gather<T: Texel>(&self, from: &[T::Atomic], rect: TexelRect) -> Vec<T> {

@@ -6,11 +6,13 @@
 //! Inside the program positions are *texel coordinates*: x = s * width - 0.5, so that texel centres are the
 //! integers and cell (i, j) is the square between the centres of texels i, i+1 and j, j+1.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 
 use glam::{DVec2, Vec2};
 use thiserror::Error;
 
+use super::grid::{HeightGrid, HeightSample};
+use super::means::Means;
 use super::texels::StoredTexels;
 use super::{Pyramid, TexelKind, TexelRect, Texels, Wrap};
 
@@ -88,25 +90,15 @@ pub enum MapError {
     },
 }
 
-/// A bilinear sample in texel coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeightSample {
-    /// Height.
-    pub height: f64,
-    /// Its derivatives by the texel coordinates, within the cell.
-    pub gradient: DVec2,
-}
-
 /// A displacement map, ready to be sampled, and the min/max pyramid over it.
 ///
 /// It is shared between surfaces and read from many threads; [`DisplacementMap::update`] edits it in place.
 #[derive(Debug)]
 pub struct DisplacementMap {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) wrap: Wrap,
-    pub(super) texels: StoredTexels,
+    pub(super) grid: HeightGrid,
     pub(super) pyramid: Pyramid,
+    /// Made when they are first asked for.
+    pub(super) means: OnceLock<Means>,
     /// Held while editing: an entry of the pyramid depends on texels of several edits.
     pub(super) editing: Mutex<()>,
 }
@@ -142,23 +134,21 @@ impl DisplacementMap {
             });
         }
         Ok(Self {
-            width,
-            height,
-            wrap,
             pyramid: Pyramid::new(&texels, width, height, wrap),
-            texels: StoredTexels::new(texels, width, height, wrap),
+            grid: HeightGrid::new(width, height, texels, wrap),
+            means: OnceLock::new(),
             editing: Mutex::new(()),
         })
     }
 
     /// Texels across and up.
     pub fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
+        (self.grid.width, self.grid.height)
     }
 
     /// The wrap mode.
     pub fn wrap(&self) -> Wrap {
-        self.wrap
+        self.grid.wrap
     }
 
     /// Smallest and largest height.
@@ -169,7 +159,7 @@ impl DisplacementMap {
 
     /// The precision of the texels.
     pub fn kind(&self) -> TexelKind {
-        self.texels.kind()
+        self.grid.texels.kind()
     }
 
     /// The stored value that means height 1: 255, 65535, or 1 for floats.
@@ -184,17 +174,17 @@ impl DisplacementMap {
 
     /// The texels as stored, in rows of [`Self::stride`].
     pub(crate) fn texels(&self) -> &StoredTexels {
-        &self.texels
+        &self.grid.texels
     }
 
     /// Stored texels per row.
     pub(crate) fn stride(&self) -> usize {
-        self.width + 1
+        self.grid.stride()
     }
 
-    /// Bytes held, texels and pyramid.
+    /// Bytes held: texels, pyramid, and means if there are any.
     pub fn bytes(&self) -> usize {
-        self.texels.bytes() + self.pyramid.bytes()
+        self.grid.texels.bytes() + self.pyramid.bytes() + self.mean_bytes()
     }
 
     /// Height at texture coordinates `st`, bilinear.
@@ -204,56 +194,20 @@ impl DisplacementMap {
 
     /// Texture coordinates in [0, 1] to texel coordinates.
     pub fn to_texel(&self, st: DVec2) -> DVec2 {
-        st * DVec2::new(self.width as f64, self.height as f64) - 0.5
+        st * DVec2::new(self.grid.width as f64, self.grid.height as f64) - 0.5
     }
 
     /// Height and in-cell gradient at texel coordinates.
     #[inline(always)]
     pub fn sample(&self, p: DVec2) -> HeightSample {
-        let (i, fx, sx) = self.cell(p.x, self.width);
-        let (j, fy, sy) = self.cell(p.y, self.height);
-        let stride = self.stride();
-        let [h00, h10, h01, h11] = self.texels.cell(j * stride + i, stride);
-        let (h00, h10) = (f64::from(h00), f64::from(h10));
-        let (h01, h11) = (f64::from(h01), f64::from(h11));
-        let (bottom, top) = (h00 + fx * (h10 - h00), h01 + fx * (h11 - h01));
-        let dx = (h10 - h00) + fy * ((h11 - h01) - (h10 - h00));
-        let unit = 1.0 / f64::from(self.unit());
-        HeightSample {
-            height: unit * (bottom + fy * (top - bottom)),
-            gradient: unit * DVec2::new(sx * dx, sy * (top - bottom)),
-        }
+        self.grid.sample(p)
     }
 
     /// A gradient without jumps at cell borders: central differences at the four texels around `p`, bilinear
     /// between them. Per texel, like [`HeightSample::gradient`].
     pub fn smooth_gradient(&self, p: DVec2) -> DVec2 {
-        let height = |dx: f64, dy: f64| self.sample(p + DVec2::new(dx, dy)).height;
-        // The bilinear interpolant of central differences is the central difference of the bilinear interpolant.
-        0.5 * DVec2::new(
-            height(1.0, 0.0) - height(-1.0, 0.0),
-            height(0.0, 1.0) - height(0.0, -1.0),
-        )
+        self.grid.smooth(p).gradient
     }
-
-    /// The cell of coordinate `x` along a side of `n` texels, the position in it, and how fast it moves with x.
-    #[inline(always)]
-    fn cell(&self, x: f64, n: usize) -> (usize, f64, f64) {
-        if x >= 0.0 && x < n as f64 - 1.0 {
-            let cell = x.floor();
-            return (whole(cell), x - cell, 1.0);
-        }
-        let (folded, slope) = self.wrap.fold(x, n as f64);
-        let i = whole(folded.floor()).min(n - 1);
-        (i, folded - i as f64, slope)
-    }
-}
-
-/// A whole number from 0 to 2^32 - 1: the low bits of its sum with 2^52, without the checks of `as`.
-#[inline(always)]
-fn whole(x: f64) -> usize {
-    const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
-    (x + TWO_TO_52).to_bits() as u32 as usize
 }
 
 #[cfg(test)]

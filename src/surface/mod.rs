@@ -13,7 +13,9 @@
 mod displaced;
 mod edit;
 mod footprint;
+mod grid;
 mod map;
+mod means;
 mod mesh;
 mod normals;
 mod patch;
@@ -25,14 +27,15 @@ mod uv;
 
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
 pub use edit::{TexelRect, Update};
-pub use map::{DisplacementMap, HeightSample, MapError};
+pub use grid::HeightSample;
+pub use map::{DisplacementMap, MapError};
 pub use mesh::{BaseMesh, MeshBuilder, MeshError, MeshReport, NormalMode};
 pub(crate) use patch::solve;
 pub use patch::{Patch, PatchPoint};
 pub use projection::Projection;
 pub(crate) use pyramid::Entries;
 pub use pyramid::{Level, Pyramid};
-pub(crate) use seams::Ruled;
+pub(crate) use seams::{ChartEdges, Ruled};
 pub use seams::{Seams, Wall};
 pub(crate) use texels::{StoredTexels, Texel};
 pub use texels::{TexelKind, Texels};

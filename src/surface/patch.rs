@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::DisplacementMap;
+use super::{DisplacementMap, HeightSample};
 
 /// S(b) over one base triangle, and its derivatives.
 #[derive(Clone, Copy, Debug)]
@@ -123,7 +123,11 @@ impl Patch<'_> {
     /// S, dS/du and dS/dv at b:
     /// dS = dP + dD N + D (dN' - N (N . dN')) / |N'| with N = N'/|N'|.
     pub fn point(&self, u: f64, v: f64) -> PatchPoint {
-        let sample = self.map.sample(self.texel(u, v));
+        self.point_of(self.map.sample(self.texel(u, v)), u, v)
+    }
+
+    /// The same for another height and gradient of the map there.
+    pub fn point_of(&self, sample: HeightSample, u: f64, v: f64) -> PatchPoint {
         let displacement = self.scale * (sample.height - self.midlevel);
         let raw_normal = self.normal(u, v);
         let inverse_length = raw_normal.length_recip();

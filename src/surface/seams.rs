@@ -22,11 +22,15 @@
 //! the same bit for bit, or whole periods of the wrap mode apart. Coordinates that differ by a rounding make a wall of
 //! next to no height.
 
+mod charts;
+
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::normals::weld;
+pub(crate) use charts::ChartEdges;
+
 use super::{BaseMesh, DisplacedSurface, Patch, SurfacePoint, TexelRect, Wrap};
 
 /// What happens where displaced sheets part: at UV seams, hard edges and borders.
@@ -307,6 +311,7 @@ impl DisplacedSurface {
             shading_normal: outward,
             texcoord: st0 + b1 as f32 * (st1 - st0) + b2 as f32 * (st2 - st0),
             displacement: height as f32,
+            tolerance: 0.0,
         }
     }
 }

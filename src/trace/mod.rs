@@ -1,6 +1,7 @@
 //! The one interface both backends implement, and the world they are built from.
 
 mod edit;
+mod offset;
 mod world;
 
 use glam::Vec3;
@@ -8,6 +9,7 @@ use glam::Vec3;
 use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
 pub use edit::Edited;
 pub(crate) use edit::grown;
+pub use offset::RayOffset;
 pub use world::{Object, Placement, Resolved, Shape, World};
 
 /// Instance levels a hit can hold: one, as Debian's Embree is built.

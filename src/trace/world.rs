@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::{Affine3A, Vec3};
 
 use super::{Hit, INVALID_ID};
-use crate::prism::Prisms;
+use crate::prism::{PrismHit, Prisms};
+use crate::ray::{Cone, Footprint, Ray};
 use crate::surface::{BaseMesh, SurfacePoint};
 
 /// One traceable shape.
@@ -107,6 +108,56 @@ impl World {
             Some(to_world) => transformed(&point, to_world),
         }
     }
+
+    /// The same as seen by the cone around `ray`, which made the hit.
+    ///
+    /// Where level of detail is off ([`Lod::Off`](crate::prism::Lod)) this is [`Self::surface_point`]. Else the position is the ray's, which is within
+    /// [`tolerance`](SurfacePoint::tolerance) of the surface, and both normals are those of the mean surface over the cone's width, on the
+    /// side of the hit's. Under transforms that stretch, the width is taken as it is along the ray.
+    pub fn seen_point(&self, hit: &Hit, ray: &Ray, cone: &Cone) -> SurfacePoint {
+        let Resolved { object, transform } = self.resolve(hit);
+        let prisms = match &self.objects[object].shape {
+            Shape::Displaced(prisms) if prisms.spread() > 0.0 => prisms,
+            _ => return self.surface_point(hit),
+        };
+        let world = cone.footprint(ray, hit.t);
+        let direction = match transform {
+            None => ray.direction,
+            Some(to_world) => to_world.inverse().transform_vector3(ray.direction),
+        };
+        let footprint = Footprint {
+            direction,
+            width: world.width * (direction.length() / ray.direction.length()),
+        };
+        let seen = prisms.seen_point(&PrismHit::from(hit), &footprint);
+        let seen = match transform {
+            None => seen,
+            Some(to_world) => transformed(&seen, to_world),
+        };
+        SurfacePoint {
+            position: ray.at(hit.t),
+            tolerance: prisms.tolerance(ray.direction, hit.t),
+            ..seen
+        }
+    }
+
+    /// [`Prisms::set_spread`] of all objects.
+    pub fn set_spread(&self, spread: f32) {
+        for object in &self.objects {
+            if let Shape::Displaced(prisms) = &object.shape {
+                prisms.set_spread(spread);
+            }
+        }
+    }
+}
+
+impl From<&Hit> for PrismHit {
+    fn from(hit: &Hit) -> Self {
+        let &Hit {
+            t, u, v, prim, ng, ..
+        } = hit;
+        Self { prim, t, u, v, ng }
+    }
 }
 
 fn triangle_point(mesh: &BaseMesh, hit: &Hit) -> SurfacePoint {
@@ -123,6 +174,7 @@ fn triangle_point(mesh: &BaseMesh, hit: &Hit) -> SurfacePoint {
         shading_normal: (b.x * n0 + b.y * n1 + b.z * n2).normalize_or(geometric_normal),
         texcoord: b.x * st0 + b.y * st1 + b.z * st2,
         displacement: 0.0,
+        tolerance: 0.0,
     }
 }
 

@@ -58,7 +58,11 @@ fn edit(prisms: &Prisms, texels: Texels) -> BoundsChange {
 }
 
 fn made(surface: &Arc<DisplacedSurface>, march: March, edit_bounds: EditBounds) -> Prisms {
-    let options = PrismOptions { march, edit_bounds };
+    let options = PrismOptions {
+        march,
+        edit_bounds,
+        ..PrismOptions::default()
+    };
     Prisms::new(surface.clone(), options).unwrap()
 }
 

@@ -51,6 +51,12 @@ pub enum MarchError {
          leave them open (seams = \"open\"), or take the exact march (march = \"exact\")"
     )]
     SeamsNeedExact,
+    /// The uniform march knows no level of detail.
+    #[error(
+        "level of detail is asked for, and the uniform march has none; \
+         leave it off (lod = \"off\"), or take the exact march (march = \"exact\")"
+    )]
+    LodNeedsExact,
     /// More base triangles than the exact march's records can number.
     #[error("the mesh has {found} triangles; the exact march takes at most {max}")]
     TooManyTriangles {

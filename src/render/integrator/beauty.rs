@@ -10,14 +10,13 @@ use glam::Vec3;
 
 use super::super::light::{InfiniteLight, prepare};
 use super::super::material::Bsdf;
-use super::super::offset::RayOffset;
 use super::super::sampler::{Dimension, Purpose, Sampler};
 use super::super::shading::ShadedPoint;
 use super::super::{RenderInput, Surfaces};
 use super::{Integrator, RayCounts};
-use crate::ray::Ray;
+use crate::ray::{Cone, Ray};
 use crate::scene::Material;
-use crate::trace::{Hit, Tracer};
+use crate::trace::{Hit, RayOffset, Tracer};
 
 /// Direct light and one reflection.
 pub struct Beauty<'a> {
@@ -27,6 +26,8 @@ pub struct Beauty<'a> {
     object_materials: &'a [usize],
     lights: Vec<Box<dyn InfiniteLight>>,
     offset: RayOffset,
+    /// Of camera rays.
+    cone: Cone,
 }
 
 impl<'a> Beauty<'a> {
@@ -39,12 +40,13 @@ impl<'a> Beauty<'a> {
             object_materials: input.object_materials,
             lights: prepare(input.lights),
             offset: RayOffset::for_scene(input.tracer.bounds().diagonal()),
+            cone: Cone::from_eye(input.camera.pixel_spread(input.film.height)),
         }
     }
 
     /// The hit of `ray`, ready for shading. `adapt` may change its material.
-    fn shaded(&self, ray: &Ray, hit: &Hit, adapt: fn(Bsdf) -> Bsdf) -> ShadedPoint {
-        let point = self.surfaces.point(hit);
+    fn shaded(&self, ray: &Ray, cone: &Cone, hit: &Hit, adapt: fn(Bsdf) -> Bsdf) -> ShadedPoint {
+        let point = self.surfaces.point(hit, ray, cone);
         let material = &self.materials[self.object_materials[self.surfaces.object(hit)]];
         let bsdf = adapt(Bsdf::new(material, point.texcoord));
         ShadedPoint::new(&point, -ray.direction, bsdf)
@@ -52,7 +54,9 @@ impl<'a> Beauty<'a> {
 
     /// A ray that leaves `point` upwards.
     fn ray_from(&self, point: &ShadedPoint, direction: Vec3, key: u32) -> Ray {
-        let origin = self.offset.apply(point.position, point.geometric_normal);
+        let normal = point.geometric_normal;
+        let start = point.position + point.tolerance * normal;
+        let origin = self.offset.apply(start, normal);
         Ray {
             key,
             ..Ray::new(origin, direction)
@@ -98,7 +102,14 @@ impl<'a> Beauty<'a> {
     }
 
     /// Light that comes by the glossy lobe: from a surface, or the lobe's own share of the lights.
-    fn reflection(&self, point: &ShadedPoint, sampler: &Sampler, rays: &mut RayCounts) -> Vec3 {
+    /// `cone` is the reflected ray's.
+    fn reflection(
+        &self,
+        point: &ShadedPoint,
+        cone: &Cone,
+        sampler: &Sampler,
+        rays: &mut RayCounts,
+    ) -> Vec3 {
         let dimension = Dimension::new(0, Purpose::Reflection);
         let Some(sample) = point.sample_specular(sampler.point(dimension)) else {
             return Vec3::ZERO;
@@ -107,7 +118,7 @@ impl<'a> Beauty<'a> {
         rays.reflection += 1;
         let arriving = match self.tracer.intersect(&ray) {
             Some(hit) => {
-                let seen = self.shaded(&ray, &hit, Bsdf::seen_in_reflection);
+                let seen = self.shaded(&ray, cone, &hit, Bsdf::seen_in_reflection);
                 self.direct(&seen, 1, false, sampler, rays)
             }
             None => self
@@ -133,13 +144,14 @@ impl Integrator for Beauty<'_> {
                 .map(|light| light.radiance(camera_ray.direction))
                 .sum();
         };
-        let point = self.shaded(camera_ray, &hit, |bsdf| bsdf);
+        let point = self.shaded(camera_ray, &self.cone, &hit, |bsdf| bsdf);
         let reflects = point.reflects();
         let direct = self.direct(&point, 0, reflects, sampler, rays);
         if !reflects {
             return direct;
         }
-        direct + self.reflection(&point, sampler, rays)
+        let cone = self.cone.continued(camera_ray, hit.t);
+        direct + self.reflection(&point, &cone, sampler, rays)
     }
 }
 

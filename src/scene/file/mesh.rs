@@ -6,7 +6,7 @@ use glam::{Affine3A, EulerRot, Quat, Vec3};
 
 use super::{Item, Keyed, STEP_TEXELS, SceneError, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
-use crate::prism::{EditBounds, March, PrismOptions, Step};
+use crate::prism::{EditBounds, Lod, March, PrismOptions, Step};
 use crate::surface::{Projection, Seams, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
@@ -121,6 +121,7 @@ impl DisplacementTable {
             "dt_world",
             "jitter",
             "edit_bounds",
+            "lod",
             "seams",
         ])?;
         let march = march(&mut section)?;
@@ -137,6 +138,7 @@ impl DisplacementTable {
             prisms: PrismOptions {
                 march,
                 edit_bounds: edit_bounds.unwrap_or_default(),
+                lod: lod(&mut section, march)?,
             },
             seams: seams(&mut section, march)?,
         })
@@ -156,6 +158,21 @@ fn seams(section: &mut super::Section, march: March) -> Result<Option<Seams>, Sc
         return Err(no_walls);
     }
     Ok(Some(seams))
+}
+
+fn lod(section: &mut super::Section, march: March) -> Result<Lod, SceneError> {
+    let Some(item) = section.get("lod") else {
+        return Ok(Lod::Off);
+    };
+    let no_cone = item.error(
+        "\"cone\" with the uniform march, which has no level of detail",
+        "\"off\", or march = \"exact\"",
+    );
+    let lod = item.word(&[Lod::Off, Lod::Cone].map(|lod| (lod.name(), lod)))?;
+    if lod == Lod::Cone && march != March::Exact {
+        return Err(no_cone);
+    }
+    Ok(lod)
 }
 
 fn channel(item: Item) -> Result<Channel, SceneError> {

@@ -82,6 +82,10 @@ pub struct Ends {
     j: Row,
     /// Largest minus smallest stored texel around each child.
     pub range: Row,
+    /// Bit k: child k is wholly above the surface.
+    pub above: u32,
+    /// Bit k: child k is wholly below it.
+    pub below: u32,
 }
 
 impl Ends {
@@ -92,6 +96,7 @@ impl Ends {
         y: &[L; R],
         h: &[L; R],
         range: &[L; R],
+        [above, below]: [u32; 2],
     ) -> Self {
         // Of one register the second copy is never looked at.
         let last = R - 1;
@@ -103,6 +108,8 @@ impl Ends {
             i: [x[0].floor().to_array(), x[last].floor().to_array()],
             j: [y[0].floor().to_array(), y[last].floor().to_array()],
             range: [range[0].to_array(), range[last].to_array()],
+            above,
+            below,
         }
     }
 

@@ -11,6 +11,8 @@
 mod arcs;
 mod cells;
 mod children;
+mod explain;
+mod lod;
 mod pieces;
 mod signs;
 mod span;
@@ -23,6 +25,7 @@ use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::{Lanes, Quad, Task};
 use crate::surface::{DisplacedSurface, Patch};
 pub use arcs::{Arcs, Found as FoundArcs, Units};
+pub use explain::explain;
 use pieces::Piece;
 use signs::Signs;
 use span::Walker;
@@ -38,6 +41,8 @@ pub struct Problem<'a> {
     pub any: bool,
     /// The open interval of ray parameters.
     pub interval: [f32; 2],
+    /// Twice how far a hit may be off, as a part of its t; 0 where it must be exact.
+    pub spread: f32,
 }
 
 impl<'a> Problem<'a> {
@@ -69,6 +74,8 @@ pub struct Found {
     pub u: f64,
     /// Barycentric coordinate of vertex 2.
     pub v: f64,
+    /// Whether the ray comes from above.
+    pub above: bool,
 }
 
 /// The first crossing on an arc that f32 set up, or any.
@@ -165,7 +172,7 @@ fn edge_on<L: Lanes>(
     for &w in &heights[..count] {
         if let Some(part) = pieces::flat::<L::Quad>(&patch, frame, w) {
             let mut signs = Signs::new(problem, frame);
-            walk_curve::<L>(problem, &part, view, &mut signs);
+            walk_curve::<L>(problem, &part, view, [None; 2], &mut signs);
             nearest = nearer(nearest, signs.nearest());
         }
     }
@@ -197,9 +204,16 @@ fn along<L: Lanes>(
     {
         return None;
     }
+    let mut caps = [None; 2];
+    if problem.spread > 0.0 && curve.is_wide {
+        caps = lod::caps(problem, stretch, &curve, ends);
+        if let Some(found) = lod::through(problem, &curve, caps) {
+            return problem.accepts(found.t).then_some(found);
+        }
+    }
     if problem.cluster.is_short(problem.lane) && pieces::is_even(&curve) {
         let mut signs = Signs::new(problem, frame);
-        walk_curve::<L>(problem, &curve, view, &mut signs);
+        walk_curve::<L>(problem, &curve, view, caps, &mut signs);
         return signs.nearest();
     }
     L::outline(Uneven {
@@ -210,18 +224,21 @@ fn along<L: Lanes>(
     })
 }
 
-/// Walks a curve, or a piece of one.
+/// Walks a curve, or a piece of one. `caps` tells whether its ends are above the surface, where that is known.
 #[inline(always)]
 fn walk_curve<L: Lanes>(
     problem: &Problem<'_>,
     curve: &Curve<L::Quad>,
     view: &View<L::Quad>,
+    caps: [Option<bool>; 2],
     signs: &mut Signs<'_, L::Quad>,
 ) {
     let start = curve.ends()[0];
     let arcs = Arcs::of_curve::<L>(problem, curve, view, start);
     signs.set_curve(*curve);
-    Walker::new(problem, &arcs, 0, curve.texel_base, start).walk::<L>(signs);
+    let mut walker = Walker::new(problem, &arcs, 0, curve.texel_base, start);
+    walker.caps = caps;
+    walker.walk::<L>(signs);
 }
 
 /// As [`along`], where A changes so much that no one span can be bounded: piece by piece.
@@ -251,7 +268,7 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
                 Piece::Flat(w) => pieces::flat(&problem.patch(), frame, w),
             };
             if let Some(part) = part {
-                walk_curve::<L>(problem, &part, self.view, &mut signs);
+                walk_curve::<L>(problem, &part, self.view, [None; 2], &mut signs);
             }
             if signs.is_done() {
                 break;
@@ -277,7 +294,7 @@ impl<L: Lanes> Task<L> for OnSurface<'_> {
 
     #[inline(always)]
     fn run(self) -> Root {
-        let Found { t, u, v } = *self.found;
+        let Found { t, u, v, .. } = *self.found;
         let point = self.problem.patch().point(u, v);
         Root {
             t,

@@ -72,6 +72,12 @@ impl<'a, Q: Quad> Signs<'a, Q> {
         self.above.is_none()
     }
 
+    /// The side of the last point.
+    #[inline(always)]
+    pub fn is_above(&self) -> Option<bool> {
+        self.above
+    }
+
     /// Whether nothing behind is wanted.
     #[inline(always)]
     pub fn is_done(&self) -> bool {
@@ -111,7 +117,7 @@ impl<'a, Q: Quad> Signs<'a, Q> {
 
     /// The present curve. Called in outlined tasks only: it is long.
     #[inline(always)]
-    fn curve(&mut self) -> Curve<Q> {
+    pub fn curve(&mut self) -> Curve<Q> {
         if let Some(curve) = self.curve {
             return curve;
         }
@@ -159,7 +165,17 @@ impl<'a, Q: Quad> Signs<'a, Q> {
             t: 0.0,
             u: 0.0,
             v: 0.0,
+            above: true,
         });
+        self.done = true;
+    }
+
+    /// Ends the search at a crossing, or without one where that is outside the ray's interval.
+    #[inline(always)]
+    pub fn end_with(&mut self, found: Found) {
+        if self.problem.accepts(found.t) {
+            self.nearest = Some(found);
+        }
         self.done = true;
     }
 
@@ -481,11 +497,6 @@ fn crossing<Q: Quad>(
             break;
         }
     }
-    let (place, depth) = curve.at(s);
-    let ([_, _, u, v], [_, z, zn, _]) = (place.to_array(), depth.to_array());
-    Found {
-        t: (z + curve.w(s) * zn) * curve.per_depth,
-        u,
-        v,
-    }
+    let [t, u, v] = curve.seen(s);
+    Found { t, u, v, above }
 }

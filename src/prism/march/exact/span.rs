@@ -5,12 +5,15 @@
 //! leave the chord between them ([`arcs`](super::arcs)). One gather from the pyramid level whose block is at least as large as
 //! the box gives the surface's range there; a child above or below it is done with.
 
+mod record;
+
 use super::Problem;
 use super::arcs::Arcs;
 use super::cells::{Chord, MOST_CELLS, Off};
 use super::children::{Ends, Stack, at, of};
+use super::lod::settle;
 use super::signs::{Side, Signs};
-use crate::prism::simd::{Grid, LANES, Lanes, Task};
+use crate::prism::simd::{Grid, LANES, Lanes, Quad, Task};
 
 /// A chord this close to the curve, in texels, may be walked cell by cell.
 pub const CLOSE: f32 = 1.0 / 64.0;
@@ -34,6 +37,8 @@ pub struct Walker<'a> {
     whole: [f32; 2],
     /// tnear and tfar from the arc's point of reference in time, narrowed by all doubt.
     surely: [f32; 2],
+    /// Whether the arc's ends are above the surface, where that is known.
+    pub caps: [Option<bool>; 2],
 }
 
 /// [`Walker::walk`] in a function of its own: its callers are many, and it is long.
@@ -91,6 +96,7 @@ impl<'a> Walker<'a> {
             grid,
             whole: [0.0, 1.0],
             surely: [f32::NEG_INFINITY, f32::INFINITY],
+            caps: [None; 2],
         };
         if problem.is_ordered() {
             walker.clip(time);
@@ -110,6 +116,10 @@ impl<'a> Walker<'a> {
             near + near.abs() * f32::EPSILON + off,
             far - far.abs() * f32::EPSILON - off,
         ];
+        // Where level of detail ends a search must not depend on the ray's interval, and so on what was met before.
+        if self.problem.spread > 0.0 {
+            return;
+        }
         let near = near - near.abs() * f32::EPSILON - off;
         let far = far + far.abs() * f32::EPSILON + off;
         if begin < near {
@@ -182,7 +192,7 @@ impl<'a> Walker<'a> {
         signs.begin();
         signs.count_span();
         let (alive, ends) = self.children::<L>(self.whole);
-        if alive == 0 {
+        if alive == 0 || self.settles(&ends, alive, self.whole, signs) {
             return;
         }
         let rest = self.visit::<L>(&ends, alive, self.whole, signs);
@@ -223,6 +233,9 @@ impl<'a> Walker<'a> {
             if alive == 0 {
                 continue;
             }
+            if self.settles(&ends, alive, span, signs) {
+                return;
+            }
             let rest = self.visit::<L>(&ends, alive, span, signs);
             if signs.is_done() {
                 return;
@@ -231,16 +244,38 @@ impl<'a> Walker<'a> {
         }
     }
 
+    /// Whether level of detail ends the search here.
+    #[inline(always)]
+    fn settles<Q: Quad>(
+        &self,
+        ends: &Ends,
+        alive: u32,
+        span: [f32; 2],
+        signs: &mut Signs<'_, Q>,
+    ) -> bool {
+        self.problem.spread > 0.0 && settle(self.problem, self.caps, ends, alive, span, signs)
+    }
+
+    /// How far the boxes of a span's children go beyond their ends, and the level of the pyramid whose blocks hold them.
+    #[inline(always)]
+    fn boxes(&self, children: usize, [from, to]: [f32; 2]) -> (f32, usize) {
+        let l = self.lane;
+        let ds = (to - from) / children as f32;
+        let [x, y] = self.base;
+        let off = self.arcs.bend[l] * ds * ds
+            + self.arcs.rounding[l]
+            + 2.0 * f32::EPSILON * x.abs().max(y.abs());
+        (off, self.grid.level(self.arcs.reach[l] * ds + 2.0 * off))
+    }
+
     #[inline(always)]
     fn cut_into<L: Lanes, const R: usize>(&self, [from, to]: [f32; 2]) -> (u32, Ends) {
         let l = self.lane;
         let children = 8 * R - 1;
         let ds = (to - from) / children as f32;
-        let off = self.arcs.bend[l] * ds * ds + self.arcs.rounding[l];
         let height_off = self.arcs.height_bend[l] * ds * ds + self.arcs.height_rounding[l];
         let [base_x, base_y] = self.base;
-        let box_off = off + 2.0 * f32::EPSILON * base_x.abs().max(base_y.abs());
-        let level = self.grid.level(self.arcs.reach[l] * ds + 2.0 * box_off);
+        let (box_off, level) = self.boxes(children, [from, to]);
 
         let zero = L::splat(0.0);
         let (mut x, mut y, mut h) = ([zero; R], [zero; R], [zero; R]);
@@ -250,33 +285,35 @@ impl<'a> Walker<'a> {
             let s = (numbers + L::splat(first)).mul_add(L::splat(ds), L::splat(from));
             (x[r], y[r], h[r]) = self.evaluate(s);
         }
-        let mut alive = 0;
+        let (mut all_above, mut all_below) = (0, 0);
         let mut range = [zero; R];
-        let (box_off, height_off_lanes) = (L::splat(box_off), L::splat(height_off));
+        let (box_off_lanes, height_off_lanes) = (L::splat(box_off), L::splat(height_off));
         for r in 0..R {
             let (x1, y1, h1) = (next(&x, r), next(&y, r), next(&h, r));
             let [low, high] = self.grid.block_range(
                 level,
                 [
-                    L::splat(base_x) + x[r].min(x1) - box_off,
-                    L::splat(base_x) + x[r].max(x1) + box_off,
+                    L::splat(base_x) + x[r].min(x1) - box_off_lanes,
+                    L::splat(base_x) + x[r].max(x1) + box_off_lanes,
                 ],
                 [
-                    L::splat(base_y) + y[r].min(y1) - box_off,
-                    L::splat(base_y) + y[r].max(y1) + box_off,
+                    L::splat(base_y) + y[r].min(y1) - box_off_lanes,
+                    L::splat(base_y) + y[r].max(y1) + box_off_lanes,
                 ],
             );
             range[r] = high - low;
             let above = (high - (h[r].min(h1) - height_off_lanes)).sign_mask();
             let below = ((h[r].max(h1) + height_off_lanes) - low).sign_mask();
-            alive |= (!(above | below) & 0xff) << (8 * r);
+            all_above |= above << (8 * r);
+            all_below |= below << (8 * r);
         }
-        alive &= (1 << children) - 1;
+        let mut alive = !(all_above | all_below) & ((1 << children) - 1);
         // Never: all that goes in is finite.
-        if !(off + height_off).is_finite() {
+        if !(box_off + height_off).is_finite() {
             alive = 0;
         }
-        (alive, Ends::new(children, &x, &y, &h, &range))
+        let ends = Ends::new(children, &x, &y, &h, &range, [all_above, all_below]);
+        (alive, ends)
     }
 
     /// Goes through the children that are left and walks their cells, in order, up to the first that is too long or too bent;

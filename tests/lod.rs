@@ -1,0 +1,469 @@
+//! Level of detail: hits within half a footprint of the exact ones and no ray lost, and a minified map that does not alias.
+#![cfg(any(feature = "embree", feature = "bvh"))]
+
+#[path = "../benches/common/mod.rs"]
+mod common;
+#[path = "exact/maps.rs"]
+mod maps;
+#[allow(dead_code)] // a part is used
+#[path = "exact/meshes.rs"]
+mod meshes;
+
+use std::sync::Arc;
+
+use common::numbers::Numbers;
+use glam::{Affine3A, Vec2, Vec3};
+use prismarch::prism::{EditBounds, Lod, March, MarchError, PrismOptions, Prisms, Step};
+use prismarch::ray::{Ray, RayPacket};
+use prismarch::render::{Picture, RenderInput, render};
+use prismarch::scene::{Camera, Color, Film, Light, Material, ToneCurve};
+use prismarch::surface::{DisplacedSurface, TexelRect, Texels, UvTransform, Wrap};
+use prismarch::trace::{Hit, Object, Placement, Shape, Tracer, World};
+
+const RAYS: usize = if cfg!(debug_assertions) { 300 } else { 6000 };
+/// From a hundredth of a texel to a good part of the map.
+const SPREADS: [f32; 4] = [1e-5, 1e-3, 0.02, 0.2];
+
+fn prisms(surface: &Arc<DisplacedSurface>, lod: Lod) -> Arc<Prisms> {
+    let options = PrismOptions {
+        lod,
+        ..PrismOptions::default()
+    };
+    Arc::new(Prisms::new(surface.clone(), options).unwrap())
+}
+
+fn world(prisms: &Arc<Prisms>, placement: Placement) -> World {
+    World::new(vec![Object {
+        shape: Shape::Displaced(prisms.clone()),
+        placement,
+        mask: u32::MAX,
+    }])
+}
+
+fn tracers(world: &World) -> Vec<Box<dyn Tracer>> {
+    vec![
+        #[cfg(feature = "embree")]
+        Box::new(
+            prismarch::embree::EmbreeTracer::new(
+                world,
+                &prismarch::embree::EmbreeOptions::default(),
+            )
+            .unwrap(),
+        ),
+        #[cfg(feature = "bvh")]
+        Box::new(prismarch::bvh::BvhTracer::new(world).unwrap()),
+    ]
+}
+
+/// Rough, smooth and spiky, by every wrap mode and kind of texel, up and down, on flat, bent and leaning meshes.
+fn surfaces() -> Vec<(&'static str, Arc<DisplacedSurface>)> {
+    let repeated = |scale: f32| UvTransform {
+        scale: Vec2::new(scale, 1.7 * scale),
+        rotation: 0.4,
+        offset: Vec2::new(0.3, -2.6),
+    };
+    let white = |wrap| maps::white(64, 64, wrap);
+    vec![
+        (
+            "white noise, low",
+            meshes::displaced(meshes::flat(2), white(Wrap::Repeat), 0.002, 0.5),
+        ),
+        (
+            "white noise",
+            meshes::displaced(meshes::flat(2), white(Wrap::Repeat), 0.2, 0.0),
+        ),
+        (
+            "repeated",
+            meshes::with_uv(
+                meshes::bent(4),
+                white(Wrap::Repeat),
+                0.02,
+                0.0,
+                repeated(40.0),
+            ),
+        ),
+        (
+            "mirrored",
+            meshes::with_uv(
+                meshes::torus(12),
+                white(Wrap::Mirror),
+                -0.05,
+                0.3,
+                repeated(3.3),
+            ),
+        ),
+        (
+            "clamped",
+            meshes::with_uv(
+                meshes::bent(3),
+                white(Wrap::Clamp),
+                0.05,
+                0.5,
+                repeated(1.6),
+            ),
+        ),
+        (
+            "8 bits",
+            meshes::displaced(meshes::torus(16), maps::white_8_bit(256), 0.02, 0.5),
+        ),
+        (
+            "floats",
+            meshes::displaced(meshes::torus(8), maps::white_float(64), -0.01, 0.2),
+        ),
+        (
+            "spikes",
+            meshes::displaced(meshes::flat(3), maps::comb(200), 0.3, 0.0),
+        ),
+        (
+            "waves",
+            meshes::displaced(meshes::bent(6), maps::waves(512, Wrap::Repeat), 0.1, 0.5),
+        ),
+        (
+            "leaning",
+            meshes::displaced(
+                meshes::leaning(meshes::torus(16), 0.7, 5),
+                maps::waves(64, Wrap::Repeat),
+                0.2,
+                0.5,
+            ),
+        ),
+        (
+            "a plane",
+            meshes::displaced(meshes::flat(1), maps::constant(0.4), 0.1, 0.0),
+        ),
+        (
+            "a ramp",
+            meshes::displaced(meshes::flat(2), maps::ramp(64), 0.5, 0.0),
+        ),
+    ]
+}
+
+/// Half of them from afar, half from nearby, some with an interval.
+fn ray(numbers: &mut Numbers, around: &prismarch::ray::Aabb) -> Ray {
+    let (middle, size) = (0.5 * (around.min + around.max), around.diagonal());
+    let away = size * 10f32.powf(numbers.between(-1.0, 1.0));
+    let origin = middle + away * numbers.direction();
+    let target = middle + 0.4 * size * numbers.direction() * numbers.number();
+    let mut ray = Ray::new(origin, (target - origin) * numbers.between(0.1, 3.0));
+    if numbers.number() < 0.2 {
+        ray.tnear = numbers.number() * away / ray.direction.length();
+        ray.tfar = ray.tnear + numbers.number() * size / ray.direction.length();
+    }
+    ray
+}
+
+/// The first hit that no interval cuts off, for the law at both ends of one.
+fn is_at_an_end(ray: &Ray, t: f32, spread: f32) -> bool {
+    let off = |end: f32| (t - end).abs() <= 0.51 * spread * t + 1e-5 * t;
+    off(ray.tnear) || off(ray.tfar)
+}
+
+#[test]
+fn hits_are_within_half_a_footprint_and_none_is_lost() {
+    for (name, surface) in surfaces() {
+        let exact = world(&prisms(&surface, Lod::Off), Placement::World);
+        let exact = tracers(&exact).remove(0);
+        let cone = prisms(&surface, Lod::Cone);
+        let placed = world(&cone, Placement::World);
+        let backends = tracers(&placed);
+        let around = exact.bounds();
+        for spread in SPREADS {
+            placed.set_spread(spread);
+            let mut numbers = Numbers::new(7);
+            let (mut hits, mut off, mut farthest) = (0, 0, 0.0f32);
+            for _ in 0..RAYS {
+                let ray = ray(&mut numbers, &around);
+                let expected = exact.intersect(&ray);
+                let found = backends[0].intersect(&ray);
+                for other in &backends {
+                    assert_eq!(
+                        other.intersect(&ray).map(bits),
+                        found.map(bits),
+                        "{name} {spread}"
+                    );
+                    assert_eq!(
+                        other.occluded(&ray),
+                        found.is_some(),
+                        "{name} {spread} {ray:?}"
+                    );
+                }
+                let (Some(a), Some(b)) = (expected, found) else {
+                    let Some(one) = expected.or(found) else {
+                        continue;
+                    };
+                    let at_an_end = is_at_an_end(&ray, one.t, spread);
+                    assert!(at_an_end, "{name} {spread}: {ray:?} {expected:?} {found:?}");
+                    continue;
+                };
+                if is_at_an_end(&ray, a.t, spread) {
+                    continue;
+                }
+                hits += 1;
+                off += usize::from(a.t != b.t);
+                let part = (a.t - b.t).abs() / (0.5 * spread * a.t);
+                farthest = farthest.max(part);
+                let most = 0.5 * spread * a.t + 4.0 * f32::EPSILON * a.t;
+                assert!(
+                    (a.t - b.t).abs() <= most,
+                    "{name} {spread}: {ray:?} {a:?} {b:?}"
+                );
+                // On the side of the ray, though it is a mean.
+                assert!(b.ng.is_normalized(), "{name}: {b:?}");
+                assert_eq!(
+                    a.ng.dot(ray.direction) < 0.0,
+                    b.ng.dot(ray.direction) < 0.0,
+                    "{name}"
+                );
+            }
+            println!(
+                "{name}, {spread}: {hits} hits, {off} not exact, at most {farthest:.3} of half a footprint"
+            );
+            assert!(hits > RAYS / 20, "{name}");
+        }
+    }
+}
+
+fn bits(hit: Hit) -> ([u32; 6], u32) {
+    let Hit {
+        t, u, v, ng, prim, ..
+    } = hit;
+    ([t, u, v, ng.x, ng.y, ng.z].map(f32::to_bits), prim)
+}
+
+#[test]
+fn without_a_spread_hits_are_exact_to_the_bit_and_packets_are_as_single_rays() {
+    for (name, surface) in surfaces() {
+        let exact = tracers(&world(&prisms(&surface, Lod::Off), Placement::World)).remove(0);
+        let cone = world(&prisms(&surface, Lod::Cone), Placement::World);
+        let tracer = tracers(&cone).remove(0);
+        let mut numbers = Numbers::new(11);
+        let rays: Vec<Ray> = (0..RAYS / 8 * 8)
+            .map(|_| ray(&mut numbers, &exact.bounds()))
+            .collect();
+        for ray in &rays {
+            assert_eq!(
+                tracer.intersect(ray).map(bits),
+                exact.intersect(ray).map(bits),
+                "{name}"
+            );
+        }
+        cone.set_spread(0.01);
+        for eight in rays.chunks(8) {
+            let single: Vec<_> = eight
+                .iter()
+                .map(|ray| tracer.intersect(ray).map(bits))
+                .collect();
+            let packet = tracer.intersect8(&RayPacket::from_rays(eight));
+            assert_eq!(packet.map(|hit| hit.map(bits)).to_vec(), single, "{name}");
+        }
+        // Off is off.
+        let off = world(&prisms(&surface, Lod::Off), Placement::World);
+        off.set_spread(0.1);
+        let off = tracers(&off).remove(0);
+        assert!(
+            rays.iter()
+                .all(|ray| off.intersect(ray).map(bits) == exact.intersect(ray).map(bits))
+        );
+    }
+}
+
+#[test]
+fn instances_scale_what_is_seen_and_not_the_angle() {
+    let surface = meshes::displaced(
+        meshes::bent(4),
+        maps::white(256, 256, Wrap::Repeat),
+        0.01,
+        0.5,
+    );
+    let cone = prisms(&surface, Lod::Cone);
+    let transform = Affine3A::from_scale_rotation_translation(
+        Vec3::splat(30.0),
+        glam::Quat::from_rotation_y(0.7),
+        Vec3::new(5.0, -80.0, 9.0),
+    );
+    let (here, there) = (
+        world(&cone, Placement::World),
+        world(&cone, Placement::Instances(vec![transform])),
+    );
+    here.set_spread(0.02);
+    let (a, b) = (tracers(&here).remove(0), tracers(&there).remove(0));
+    let mut numbers = Numbers::new(3);
+    let mut seen = 0;
+    for _ in 0..RAYS {
+        let ray = ray(&mut numbers, &a.bounds());
+        let far = Ray {
+            origin: transform.transform_point3(ray.origin),
+            direction: transform.transform_vector3(ray.direction),
+            ..ray
+        };
+        let (Some(near), Some(other)) = (a.intersect(&ray), b.intersect(&far)) else {
+            continue;
+        };
+        // Rounding may decide for another run of the curve.
+        if (near.t - other.t).abs() > 1e-5 * near.t {
+            continue;
+        }
+        seen += 1;
+        let eye = prismarch::ray::Cone::from_eye(0.02);
+        let (p, q) = (
+            here.seen_point(&near, &ray, &eye),
+            there.seen_point(&other, &far, &eye),
+        );
+        let moved = transform.transform_point3(p.position);
+        assert!(moved.distance(q.position) < 1e-3 * q.position.length());
+        assert!((30.0 * p.tolerance / q.tolerance - 1.0).abs() < 1e-3);
+        let turned = transform.transform_vector3(p.shading_normal).normalize();
+        assert!(turned.dot(q.shading_normal) > 0.999, "{p:?} {q:?}");
+    }
+    assert!(seen > RAYS / 20);
+}
+
+#[test]
+fn edits_are_seen() {
+    // With room for all heights prisms, and so hits, do not depend on what was there before.
+    let prisms = |surface: &Arc<DisplacedSurface>| {
+        let options = PrismOptions {
+            lod: Lod::Cone,
+            edit_bounds: EditBounds::Range,
+            ..PrismOptions::default()
+        };
+        Arc::new(Prisms::new(surface.clone(), options).unwrap())
+    };
+    let noise = maps::white(256, 256, Wrap::Repeat);
+    let surface = meshes::displaced(meshes::flat(4), noise, 0.004, 0.0);
+    let cone = prisms(&surface);
+    let placed = world(&cone, Placement::World);
+    placed.set_spread(0.03);
+    let rect = TexelRect {
+        x: 40,
+        y: 70,
+        width: 150,
+        height: 100,
+    };
+    let slope = |i: usize| (i % rect.width * 400) as u16;
+    let texels = Texels::U16((0..rect.width * rect.height).map(slope).collect());
+    surface.map().update(rect, &texels).unwrap();
+    cone.map_edited(rect);
+    let whole = TexelRect {
+        x: 0,
+        y: 0,
+        width: 256,
+        height: 256,
+    };
+    let again = prismarch::surface::DisplacementMap::new(
+        256,
+        256,
+        surface.map().read(whole).unwrap(),
+        Wrap::Repeat,
+    );
+    let again = meshes::displaced(meshes::flat(4), again.unwrap(), 0.004, 0.0);
+    let new = world(&prisms(&again), Placement::World);
+    new.set_spread(0.03);
+    let (edited, new) = (tracers(&placed).remove(0), tracers(&new).remove(0));
+    let mut numbers = Numbers::new(2);
+    for _ in 0..RAYS {
+        let ray = ray(&mut numbers, &new.bounds());
+        let (a, b) = (edited.intersect(&ray), new.intersect(&ray));
+        assert_eq!(a.map(bits), b.map(bits), "{ray:?}");
+    }
+}
+
+#[test]
+fn the_uniform_march_has_none() {
+    let surface = meshes::displaced(meshes::flat(1), maps::constant(0.5), 0.1, 0.0);
+    let options = PrismOptions {
+        march: March::Uniform {
+            step: Step::Texels(1.0),
+            jitter: false,
+        },
+        lod: Lod::Cone,
+        ..PrismOptions::default()
+    };
+    assert_eq!(
+        Prisms::new(surface, options).err(),
+        Some(MarchError::LodNeedsExact)
+    );
+}
+
+/// A plane under a map of white noise, some forty texels of which are in a pixel each way.
+fn picture(surface: &Arc<DisplacedSurface>, lod: Lod, spp: u32) -> Picture {
+    let camera = Camera {
+        position: Vec3::new(0.5, -0.3, 1.1),
+        target: Vec3::new(0.5, 0.45, 0.0),
+        up: Vec3::Z,
+        fov: 0.3,
+    };
+    let film = Film {
+        width: 64,
+        height: 64,
+        spp,
+        seed: 1,
+        exposure: 0.0,
+        tone: ToneCurve::Standard,
+    };
+    let placed = world(&prisms(surface, lod), Placement::World);
+    placed.set_spread(camera.pixel_spread(film.height));
+    let tracer = tracers(&placed).remove(0);
+    let sun = Light::Sun {
+        direction: Vec3::new(-0.5, 0.3, 0.6).normalize(),
+        strength: 1.0,
+    };
+    let rough = Material {
+        name: "rough".into(),
+        base_color: Color::Constant(Vec3::splat(0.5)),
+        metallic: 0.0,
+        roughness: 1.0,
+        specular: 0.0,
+    };
+    let input = RenderInput {
+        tracer: &*tracer,
+        surfaces: &placed,
+        camera: &camera,
+        film: &film,
+        materials: &[rough],
+        object_materials: &[0],
+        lights: &[sun],
+    };
+    render(&input, &|_, _| {})
+}
+
+/// Root of the mean square difference, as a part of the mean of `b`.
+fn difference(a: &Picture, b: &Picture) -> f32 {
+    let pairs = a.pixels.iter().zip(&b.pixels);
+    let squares: f32 = pairs.map(|(a, b)| (a.y - b.y) * (a.y - b.y)).sum();
+    let mean = b.pixels.iter().map(|p| p.y).sum::<f32>() / b.pixels.len() as f32;
+    (squares / a.pixels.len() as f32).sqrt() / mean
+}
+
+/// The standard deviation of its pixels, as a part of their mean.
+fn grain(picture: &Picture) -> f32 {
+    let count = picture.pixels.len() as f32;
+    let mean = picture.pixels.iter().map(|p| p.y).sum::<f32>() / count;
+    let squares = picture.pixels.iter().map(|p| (p.y - mean) * (p.y - mean));
+    (squares.sum::<f32>() / count).sqrt() / mean
+}
+
+#[test]
+fn a_minified_map_does_not_alias() {
+    const SIDE: usize = 4096;
+    // Root mean square of the map's slopes, and the largest part of the difference that may be left: where slopes are steep,
+    // shadows among texels and light that falls flat on their sides are missed, and the picture is a little too bright.
+    let cases = [(0.04, 0.25), (0.1, 0.4)];
+    let spp = if cfg!(debug_assertions) { 32 } else { 256 };
+    for (slope, most) in cases {
+        // Of central differences over white noise.
+        let scale = slope / (0.204 * SIDE as f32);
+        let noise = maps::white(SIDE, SIDE, Wrap::Repeat);
+        let surface = meshes::displaced(meshes::flat(1), noise, scale, 0.5);
+        let converged = picture(&surface, Lod::Off, spp);
+        let (off, cone) = (
+            picture(&surface, Lod::Off, 1),
+            picture(&surface, Lod::Cone, 1),
+        );
+        let (without, with) = (difference(&off, &converged), difference(&cone, &converged));
+        let [a, b] = [&off, &cone].map(grain);
+        println!("slopes of {slope}: off {without:.4}, grain {a:.4}; cone {with:.4}, grain {b:.4}");
+        assert!(with < most * without, "{slope}: {with} {without}");
+        assert!(b < 0.1 * a, "{slope}: {b} {a}");
+    }
+}
