@@ -68,6 +68,11 @@ impl Bsdf {
         }
     }
 
+    /// What is reflected of white light from all around, seen from above.
+    pub fn albedo(&self) -> Vec3 {
+        (self.diffuse * (1.0 - self.coat) + self.f0).min(Vec3::ONE)
+    }
+
     /// The same, blurred, for a surface that is seen in a reflection and traces none itself.
     pub fn seen_in_reflection(mut self) -> Self {
         self.alpha = self.alpha.max(SMOOTHEST_IN_REFLECTION);

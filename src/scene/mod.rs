@@ -5,6 +5,8 @@
 mod build;
 mod error;
 mod file;
+mod film;
+mod fingerprint;
 pub mod load;
 mod world;
 
@@ -19,7 +21,8 @@ use crate::surface::{BaseMesh, DisplacedSurface, UvTransform, Wrap};
 
 pub use build::{Loaded, MapFile, MeshAndMap};
 pub use error::{AssetError, Place, SceneError};
-pub(crate) use file::{MAX_SIDE, MAX_SPP, STEP_TEXELS, too_many_pixels};
+pub(crate) use file::{MAX_SIDE, MAX_SPP, MAX_STOPS, STEP_TEXELS, fits, too_many_pixels};
+pub use film::{Adaptive, Aov, AovSet, Film, Filter, FilterShape, ToneCurve, Window};
 
 /// A perspective camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,34 +35,6 @@ pub struct Camera {
     pub up: Vec3,
     /// Vertical field of view, radians, in (0, pi).
     pub fov: f32,
-}
-
-/// How linear radiance becomes an 8-bit picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ToneCurve {
-    /// A filmic shoulder and toe, then sRGB.
-    #[default]
-    Filmic,
-    /// sRGB only, clipped.
-    Standard,
-}
-
-/// Size and sampling of the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Film {
-    /// Pixels across.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-    /// Samples per pixel, at least 1.
-    pub spp: u32,
-    /// Seed of all randomness.
-    pub seed: u32,
-    /// Stops: radiance is multiplied by 2^exposure.
-    pub exposure: f32,
-    /// For PNG; EXR stays linear.
-    pub tone: ToneCurve,
 }
 
 /// A colour texture, linear RGB in memory.

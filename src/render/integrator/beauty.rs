@@ -8,6 +8,7 @@
 
 use glam::Vec3;
 
+use super::super::film::{CameraSample, FirstHit};
 use super::super::light::{InfiniteLight, prepare};
 use super::super::material::Bsdf;
 use super::super::offset::RayOffset;
@@ -17,6 +18,7 @@ use super::super::{RenderInput, Surfaces};
 use super::{Integrator, RayCounts};
 use crate::ray::Ray;
 use crate::scene::Material;
+use crate::surface::SurfacePoint;
 use crate::trace::{Hit, Tracer};
 
 /// Direct light and one reflection.
@@ -42,12 +44,11 @@ impl<'a> Beauty<'a> {
         }
     }
 
-    /// The hit of `ray`, ready for shading. `adapt` may change its material.
-    fn shaded(&self, ray: &Ray, hit: &Hit, adapt: fn(Bsdf) -> Bsdf) -> ShadedPoint {
+    /// The surface at a hit, and how it scatters.
+    fn surface(&self, hit: &Hit) -> (SurfacePoint, Bsdf) {
         let point = self.surfaces.point(hit);
         let material = &self.materials[self.object_materials[self.surfaces.object(hit)]];
-        let bsdf = adapt(Bsdf::new(material, point.texcoord));
-        ShadedPoint::new(&point, -ray.direction, bsdf)
+        (point, Bsdf::new(material, point.texcoord))
     }
 
     /// A ray that leaves `point` upwards.
@@ -107,7 +108,8 @@ impl<'a> Beauty<'a> {
         rays.reflection += 1;
         let arriving = match self.tracer.intersect(&ray) {
             Some(hit) => {
-                let seen = self.shaded(&ray, &hit, Bsdf::seen_in_reflection);
+                let (surface, bsdf) = self.surface(&hit);
+                let seen = ShadedPoint::new(&surface, -ray.direction, bsdf.seen_in_reflection());
                 self.direct(&seen, 1, false, sampler, rays)
             }
             None => self
@@ -124,22 +126,32 @@ impl<'a> Beauty<'a> {
 }
 
 impl Integrator for Beauty<'_> {
-    fn radiance(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> Vec3 {
+    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample {
         rays.camera += 1;
         let Some(hit) = self.tracer.intersect(camera_ray) else {
-            return self
-                .lights
-                .iter()
-                .map(|light| light.radiance(camera_ray.direction))
-                .sum();
+            let lights = self.lights.iter();
+            let radiance = lights.map(|light| light.radiance(camera_ray.direction));
+            return CameraSample::background(radiance.sum());
         };
-        let point = self.shaded(camera_ray, &hit, |bsdf| bsdf);
+        let (surface, bsdf) = self.surface(&hit);
+        let point = ShadedPoint::new(&surface, -camera_ray.direction, bsdf);
         let reflects = point.reflects();
-        let direct = self.direct(&point, 0, reflects, sampler, rays);
-        if !reflects {
-            return direct;
+        let mut radiance = self.direct(&point, 0, reflects, sampler, rays);
+        if reflects {
+            radiance += self.reflection(&point, sampler, rays);
         }
-        direct + self.reflection(&point, sampler, rays)
+        CameraSample {
+            radiance,
+            first: Some(FirstHit {
+                albedo: bsdf.albedo(),
+                normal: surface.shading_normal,
+                position: surface.position,
+                texcoord: surface.texcoord,
+                displacement: surface.displacement,
+                object: self.surfaces.object(&hit),
+                prim: hit.prim,
+            }),
+        }
     }
 }
 

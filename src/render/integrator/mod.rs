@@ -2,10 +2,9 @@
 
 mod beauty;
 
-use glam::Vec3;
-
 pub use beauty::Beauty;
 
+use super::film::CameraSample;
 use super::sampler::Sampler;
 use crate::ray::Ray;
 
@@ -37,6 +36,6 @@ impl std::ops::AddAssign for RayCounts {
 
 /// Estimates the radiance that arrives along a camera ray.
 pub trait Integrator: Sync {
-    /// One estimate. `sampler` is its only randomness; the rays it traces are added to `rays`.
-    fn radiance(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> Vec3;
+    /// One estimate, and what the ray met first. `sampler` is its only randomness; the rays it traces are added to `rays`.
+    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample;
 }

@@ -2,6 +2,7 @@
 //!
 //! The format is described in docs/scene.md. What is loaded from other files follows in `build`.
 
+mod film;
 mod mesh;
 mod reader;
 mod shading;
@@ -11,11 +12,11 @@ use std::path::{Path, PathBuf};
 
 use super::Film;
 use super::error::{AssetError, Place, SceneError};
+pub(crate) use film::{MAX_SIDE, MAX_SPP, MAX_STOPS, fits, too_many_pixels};
 pub(super) use mesh::{DisplacementTable, MeshTable, SCALE};
 use reader::{Item, Section, Source};
 pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, default_sun};
 pub(super) use view::CameraTable;
-pub(crate) use view::{MAX_SIDE, MAX_SPP, too_many_pixels};
 
 /// The least step of a march in texels, and the largest: beyond, a ray would take minutes or see nothing.
 pub(crate) const STEP_TEXELS: std::ops::RangeInclusive<f32> = 1e-3..=1e6;
@@ -78,7 +79,7 @@ impl SceneFile {
             camera: root
                 .optional("camera", CameraTable::read)?
                 .unwrap_or_default(),
-            film: root.optional("film", view::film)?.unwrap_or_default(),
+            film: root.optional("film", film::film)?.unwrap_or_default(),
             meshes: tables(&mut root, "mesh", |item| MeshTable::read(item, folder))?,
             materials: tables(&mut root, "material", |item| {
                 MaterialTable::read(item, folder)
