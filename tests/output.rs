@@ -189,6 +189,25 @@ fn a_file_tells_what_it_is() {
 }
 
 #[test]
+fn any_key_can_be_set_and_is_part_of_the_scene() {
+    let folder = folder();
+    done(
+        &folder,
+        "render scene.toml -o a.exr --set film.spp=3 --set mesh.0.displacement.scale=0.3",
+    );
+    folder.put(
+        "b.toml",
+        folder
+            .text("scene.toml")
+            .replace("scale = 0.2", "scale = 0.3"),
+    );
+    done(&folder, "render b.toml -o b.exr --spp 3 --set film.spp=4");
+    assert!(pixels(&folder, "a.exr") == pixels(&folder, "b.exr"));
+    let [a, b] = ["a.exr", "b.exr"].map(|name| attributes(&folder, name));
+    assert_eq!(a["scene_hash"], b["scene_hash"]);
+}
+
+#[test]
 fn the_scene_s_hash_is_that_of_what_is_seen() {
     let folder = folder();
     let hash = |scene: &str| {
@@ -282,6 +301,9 @@ fn odd_options_are_refused_before_the_work() {
         ("--tone aces", &["--tone", "agx"]),
         ("--exposure 65", &["--exposure", "64"]),
         ("--resume", &[".exr", "--resume"]),
+        ("--set film.spp=0", &["--set:1:10", "film.spp", "found 0"]),
+        ("--set film.speed=1", &["--set:1:6", "film.speed"]),
+        ("--set mesh.0.file=no.obj", &["--set:1:13", "no.obj"]),
     ] {
         refused(
             &folder,

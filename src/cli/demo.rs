@@ -68,6 +68,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         target: Target::new(&scene.with_extension("png"))?,
         scene: &scene,
         film: &args.film,
+        set: &[],
         samples: None,
         resume: false,
         march: &MarchArgs::default(),

@@ -106,6 +106,7 @@ impl CliError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::PictureFormat { .. } => USAGE,
+            Self::Scene(error) if error.is_override() => USAGE,
             Self::Scene(_) | Self::Asset(_) | Self::March(_) | Self::Frame(_) | Self::Rays(_) => {
                 INPUT
             }

@@ -46,6 +46,10 @@ pub struct Args {
     output: Option<PathBuf>,
     #[command(flatten)]
     film: FilmArgs,
+    /// A key of the scene file with another value, like film.spp=64, light.0.strength=2 or material.rock.roughness=0.2; may be
+    /// given again
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
     /// Samples A to B - 1 of those of every pixel, to be merged with others [default: all]
     #[arg(long, value_name = "A..B", value_parser = parse::samples)]
     samples: Option<Range<u32>>,
@@ -72,6 +76,8 @@ pub struct Job<'a> {
     pub target: Target,
     /// Film settings that win over the scene's.
     pub film: &'a FilmArgs,
+    /// Values that win over the scene's, and lose to other options.
+    pub set: &'a [String],
     /// Which samples; `None` for all.
     pub samples: Option<Range<u32>>,
     /// Go on with the picture if it is there.
@@ -103,6 +109,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         scene: &args.scene,
         target,
         film: &args.film,
+        set: &args.set,
         samples: args.samples.clone(),
         resume: args.resume,
         march: &args.march,
@@ -117,7 +124,7 @@ impl Job<'_> {
     /// Loads, builds, renders, writes, and says so in one line.
     pub fn run(&self) -> Result<(), CliError> {
         let mut clock = Clock::start();
-        let mut loaded = Loaded::from_file(self.scene)?;
+        let mut loaded = Loaded::from_file_with(self.scene, self.set)?;
         super::warn(&loaded.warnings);
         self.film.apply(&mut loaded.scene.film)?;
         self.march.apply(&mut loaded.scene, false)?;

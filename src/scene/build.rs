@@ -69,7 +69,13 @@ pub struct MeshAndMap {
 impl Loaded {
     /// Loads the scene file at `path` and every file it names.
     pub fn from_file(path: &Path) -> Result<Self, SceneError> {
-        let file = SceneFile::read(path)?;
+        Self::from_file_with(path, &[])
+    }
+
+    /// The same with values laid over those of the file: `KEY=VALUE` in TOML, like `film.spp=64`,
+    /// `material.rock.roughness=0.2` or `light.0.strength=2`. Items of lists go by number or name.
+    pub fn from_file_with(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let file = SceneFile::read(path, overrides)?;
         let mut builder = Builder::default();
         for material in &file.materials {
             let material = builder.material(material)?;

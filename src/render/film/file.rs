@@ -5,6 +5,7 @@
 //! halves of their 64 bits: going on or merging then loses nothing.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::UVec2;
 
@@ -68,7 +69,7 @@ impl FrameFile {
         let size = UVec2::new(picture.display.0 as u32, picture.display.1 as u32);
         let info = FrameInfo::read(path, size, &picture.attributes)?;
         check_window(path, &picture, &info)?;
-        let layout = Layout::new(aovs(path, &picture.attributes)?);
+        let layout = Arc::new(Layout::new(aovs(path, &picture.attributes)?));
         let objects = if layout.aovs().has(Aov::Object) {
             let name = object_attribute("manifest");
             Objects::of_manifest(attribute(path, &picture.attributes, &name)?)
@@ -76,7 +77,13 @@ impl FrameFile {
             Objects::default()
         };
         let bounds = info.bounds();
-        let mut frame = Frame::empty(bounds.window, bounds.samples, None, layout, objects);
+        let mut frame = Frame::empty(
+            bounds.window,
+            bounds.samples,
+            None,
+            layout,
+            Arc::new(objects),
+        );
         fill(path, &mut frame, &picture, !info.is_final())?;
         Ok(Self { frame, info })
     }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{UVec2, Vec3};
 
@@ -17,8 +18,8 @@ pub struct Frame {
     window: Window,
     samples: Range<u32>,
     adaptive: Option<Adaptive>,
-    layout: Layout,
-    objects: Objects,
+    layout: Arc<Layout>,
+    objects: Arc<Objects>,
     counts: Vec<Counts>,
     /// Per pixel, the sums that the layout keeps.
     sums: Vec<f64>,
@@ -30,16 +31,22 @@ pub struct Frame {
 impl Frame {
     /// The window of `film` without any sample; it will get those of numbers `samples`, which is not empty.
     pub fn new(film: &Film, samples: Range<u32>, objects: Objects) -> Self {
-        let layout = Layout::of(film);
-        Self::empty(film.window(), samples, film.adaptive, layout, objects)
+        let layout = Arc::new(Layout::of(film));
+        Self::empty(
+            film.window(),
+            samples,
+            film.adaptive,
+            layout,
+            Arc::new(objects),
+        )
     }
 
     pub(super) fn empty(
         window: Window,
         samples: Range<u32>,
         adaptive: Option<Adaptive>,
-        layout: Layout,
-        objects: Objects,
+        layout: Arc<Layout>,
+        objects: Arc<Objects>,
     ) -> Self {
         let pixels = window.pixels();
         let none = Pixel::default();
@@ -94,7 +101,7 @@ impl Frame {
     /// Takes a frame that was read from a file up again, for the film and the objects it was begun with.
     pub fn go_on_with(&mut self, film: &Film, objects: Objects) {
         self.adaptive = film.adaptive;
-        self.objects = objects;
+        self.objects = Arc::new(objects);
     }
 
     /// Fails unless the frame of the file at `path` keeps the same sums as `other`.

@@ -7,7 +7,7 @@ use crate::scene::{Adaptive, Aov, AovSet, Film, Filter, FilterShape, ToneCurve, 
 
 /// Largest width and height of a picture.
 pub(crate) const MAX_SIDE: u32 = 65_536;
-/// Most pixels of a picture: 2^28, which is 3 GB of linear RGB.
+/// Most pixels of a picture: 2^28, which is 13 GB of sums without AOVs.
 const MAX_PIXELS: u64 = 1 << 28;
 /// Most samples per pixel.
 pub(crate) const MAX_SPP: u32 = 1 << 20;
@@ -127,7 +127,7 @@ mod tests {
 
     fn read(keys: &str) -> Result<Film, String> {
         let text = format!("[film]\n{keys}\n[[mesh]]\nfile = \"a.obj\"");
-        let file = SceneFile::parse(Path::new("s.toml"), &text);
+        let file = SceneFile::parse_with(Path::new("s.toml"), &text, &[]);
         file.map(|file| file.film).map_err(|e| e.to_string())
     }
 

@@ -4,6 +4,7 @@
 
 mod film;
 mod mesh;
+mod overrides;
 mod reader;
 mod shading;
 mod view;
@@ -14,6 +15,8 @@ use super::Film;
 use super::error::{AssetError, Place, SceneError};
 pub(crate) use film::{MAX_SIDE, MAX_SPP, MAX_STOPS, fits, too_many_pixels};
 pub(super) use mesh::{DisplacementTable, MeshTable, SCALE};
+pub(super) use overrides::OPTION;
+use overrides::Override;
 use reader::{Item, Section, Source};
 pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, default_sun};
 pub(super) use view::CameraTable;
@@ -61,18 +64,23 @@ impl<T> Keyed<T> {
 }
 
 impl SceneFile {
-    /// Reads the file at `path`.
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
+    /// Reads the file at `path`, with `overrides` (`key=value`) laid over it.
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
             path: path.to_owned(),
             source,
         })?;
-        Self::parse(path, &text)
+        Self::parse_with(path, &text, overrides)
     }
 
     /// Reads the text of a scene file; `path` is for messages and to find the files it names.
-    pub fn parse(path: &Path, text: &str) -> Result<Self, SceneError> {
-        let source = Source { file: path, text };
+    pub fn parse_with(path: &Path, text: &str, overrides: &[String]) -> Result<Self, SceneError> {
+        let overrides = Override::all(text.len(), overrides);
+        let source = Source {
+            file: path,
+            text,
+            overrides: &overrides,
+        };
         let mut root = source.parse(&["camera", "film", "mesh", "material", "light"])?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Ok(Self {

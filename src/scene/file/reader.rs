@@ -10,6 +10,7 @@ use glam::{Vec2, Vec3};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::overrides::Override;
 use super::{Place, SceneError};
 
 /// What is found where a required key is missing.
@@ -20,20 +21,29 @@ const MISSING: &str = "nothing (the key is missing)";
 pub(super) struct Source<'a> {
     pub file: &'a Path,
     pub text: &'a str,
+    /// What is laid over it.
+    pub overrides: &'a [Override],
 }
 
 impl<'a> Source<'a> {
     /// The document as its root section.
     pub fn parse(self, keys: &'static [&'static str]) -> Result<Section<'a>, SceneError> {
-        let root = DeTable::parse(self.text).map_err(|e| SceneError::Syntax {
-            place: self.place(e.span().unwrap_or(0..0)),
-            message: e.message().to_owned(),
-        })?;
-        Section::open(self, String::new(), 0..0, root.into_inner(), keys)
+        let root = DeTable::parse(self.text).map_err(|e| self.syntax_error(&e))?;
+        let root = self.overridden(root.into_inner())?;
+        Section::open(self, String::new(), 0..0, root, keys)
     }
 
-    fn place(self, span: Range<usize>) -> Box<Place> {
-        Box::new(Place::new(self.file, self.text, span))
+    pub(super) fn syntax_error(self, error: &toml::de::Error) -> SceneError {
+        SceneError::Syntax {
+            place: self.place(error.span().unwrap_or(0..0)),
+            message: error.message().to_owned(),
+        }
+    }
+
+    pub(super) fn place(self, span: Range<usize>) -> Box<Place> {
+        let mut overrides = self.overrides.iter();
+        let place = overrides.find_map(|o| o.place(&span));
+        Box::new(place.unwrap_or_else(|| Place::new(self.file, self.text, span)))
     }
 }
 

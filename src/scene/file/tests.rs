@@ -7,7 +7,7 @@ use crate::prism::{EditBounds, March, PrismOptions, Step};
 use crate::surface::Wrap;
 
 fn parse(text: &str) -> Result<SceneFile, SceneError> {
-    SceneFile::parse(Path::new("folder/scene.toml"), text)
+    SceneFile::parse_with(Path::new("folder/scene.toml"), text, &[])
 }
 
 fn refusal(text: &str) -> String {
