@@ -67,6 +67,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         target: Target::new(&scene.with_extension("png"))?,
         scene: &scene,
         film: &args.film,
+        integrator: None,
         march: &MarchArgs::default(),
         stats: None,
         engine: &args.engine,

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use clap::builder::PossibleValuesParser;
 use serde::Serialize;
 
 use super::engine::{Engine, EngineArgs};
@@ -15,7 +16,7 @@ use super::picture::Target;
 use super::progress::Progress;
 use crate::image::{OutputError, atomic};
 use crate::render::{Picture, RenderInput, RenderStats};
-use crate::scene::{Film, Loaded, MAX_SPP};
+use crate::scene::{Film, Integrator, Loaded, MAX_SPP};
 use crate::trace::World;
 
 /// Render a scene file to a picture
@@ -37,6 +38,9 @@ pub struct Args {
     output: Option<PathBuf>,
     #[command(flatten)]
     film: FilmArgs,
+    /// What is computed, instead of the scene's integrator
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Integrator::names()))]
+    integrator: Option<String>,
     #[command(flatten)]
     march: MarchArgs,
     /// Write times, ray counts and memory as JSON
@@ -71,6 +75,8 @@ pub struct Job<'a> {
     pub target: Target,
     /// Film settings that win over the scene's.
     pub film: &'a FilmArgs,
+    /// The name of an integrator that wins over the scene's.
+    pub integrator: Option<&'a str>,
     /// Marches that win over the scene's.
     pub march: &'a MarchArgs,
     /// Where the statistics go.
@@ -98,6 +104,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         scene: &args.scene,
         target,
         film: &args.film,
+        integrator: args.integrator.as_deref(),
         march: &args.march,
         stats: args.stats.as_deref(),
         engine: &args.engine,
@@ -113,6 +120,9 @@ impl Job<'_> {
         let mut loaded = Loaded::from_file(self.scene)?;
         super::warn(&loaded.warnings);
         self.film.apply(&mut loaded.scene.film);
+        if let Some(integrator) = self.integrator.and_then(Integrator::named) {
+            loaded.scene.integrator = integrator;
+        }
         self.march.apply(&mut loaded.scene, false)?;
         let load = clock.lap();
         let world = loaded.scene.world()?;
@@ -168,6 +178,7 @@ impl Job<'_> {
                 materials: &scene.materials,
                 object_materials: &object_materials,
                 lights: &scene.lights,
+                integrator: &scene.integrator,
             },
             &|done, total| progress.report(done, total),
         );
@@ -221,7 +232,9 @@ struct Seconds {
 struct Rays {
     camera: u64,
     shadow: u64,
+    diffuse: u64,
     reflection: u64,
+    refraction: u64,
     total: u64,
 }
 
@@ -231,7 +244,9 @@ impl From<&RenderStats> for Rays {
         Self {
             camera: rays.camera,
             shadow: rays.shadow,
+            diffuse: rays.diffuse,
             reflection: rays.reflection,
+            refraction: rays.refraction,
             total: rays.total(),
         }
     }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, UVec2, Vec2, Vec3};
 
-use super::camera::PinholeCamera;
+use super::camera::Eye;
 use super::filter::PixelFilter;
 use super::integrator::{Integrator, RayCounts};
 use super::sampler::{Dimension, Purpose, Sampler};
@@ -31,7 +31,7 @@ pub struct TileResult {
 /// All that turns a tile into pixels.
 pub struct TileRenderer<'a> {
     /// Where rays start.
-    pub camera: PinholeCamera,
+    pub camera: Eye,
     /// Where on a pixel.
     pub filter: PixelFilter,
     /// What they bring.
@@ -67,7 +67,8 @@ impl TileRenderer<'_> {
         for index in 0..self.film.spp {
             let sampler = Sampler::new(pixel, index, self.film.seed);
             let offset = self.filter.offset(sampler.point(dimension));
-            let mut ray = self.camera.ray(centre + offset);
+            let lens = sampler.point(Dimension::new(0, Purpose::Lens));
+            let mut ray = self.camera.ray(centre + offset, lens);
             ray.key = sampler.ray_key(dimension);
             let radiance = self.integrator.radiance(&ray, &sampler, &mut tally.rays);
             if radiance.is_finite() {
@@ -168,13 +169,11 @@ mod tests {
             tone: ToneCurve::Standard,
         };
         let camera = Camera {
-            position: Vec3::ZERO,
-            target: Vec3::NEG_Z,
-            up: Vec3::Y,
             fov: 1.0,
+            ..Camera::default()
         };
         let renderer = TileRenderer {
-            camera: PinholeCamera::new(&camera, 8, 8),
+            camera: Eye::new(&camera, 8, 8),
             filter: PixelFilter::blackman_harris(),
             integrator: &Broken,
             film: &film,

@@ -9,10 +9,11 @@
 //! whatever the number of threads and the order of tiles. Radiance is linear RGB with Rec. 709 primaries.
 
 mod basis;
+mod bsdf;
 mod camera;
+mod detail;
 mod film;
 mod filter;
-mod ggx;
 mod integrator;
 mod light;
 mod material;
@@ -30,13 +31,12 @@ pub use integrator::RayCounts;
 pub use offset::RayOffset;
 pub use tone::to_srgb8;
 
-use crate::scene::{Camera, Film, Light, Material};
+use crate::scene::{Camera, Film, Integrator, Light, Material};
 use crate::surface::SurfacePoint;
-use crate::trace::{Hit, Tracer, World};
-use camera::PinholeCamera;
+use crate::trace::{Hit, PlacedObject, Tracer, World};
+use camera::Eye;
 use film::{TileGrid, TileRenderer};
 use filter::PixelFilter;
-use integrator::Beauty;
 
 /// Pixels along a tile's side: small enough that the last tiles keep all threads busy.
 const TILE: u32 = 32;
@@ -48,6 +48,16 @@ pub trait Surfaces: Sync {
 
     /// Index of the object that was hit.
     fn object(&self, hit: &Hit) -> usize;
+
+    /// Every object once per place where it stands, by rising top-level ids: where light may come from.
+    fn placed(&self) -> Vec<PlacedObject>;
+
+    /// |dS/du x dS/dv| there, square world units; `None` where (u, v) are no barycentric coordinates.
+    fn area_element(&self, hit: &Hit) -> Option<f32>;
+
+    /// dP/ds and dP/dt of the undisplaced surface along its texture coordinates, world space; `None` where it has
+    /// none.
+    fn tangents(&self, hit: &Hit) -> Option<[Vec3; 2]>;
 }
 
 impl Surfaces for World {
@@ -57,6 +67,18 @@ impl Surfaces for World {
 
     fn object(&self, hit: &Hit) -> usize {
         self.resolve(hit).object
+    }
+
+    fn placed(&self) -> Vec<PlacedObject> {
+        World::placed(self)
+    }
+
+    fn area_element(&self, hit: &Hit) -> Option<f32> {
+        World::area_element(self, hit)
+    }
+
+    fn tangents(&self, hit: &Hit) -> Option<[Vec3; 2]> {
+        World::tangents(self, hit)
     }
 }
 
@@ -75,8 +97,10 @@ pub struct RenderInput<'a> {
     pub materials: &'a [Material],
     /// Per object of the world an index into `materials`.
     pub object_materials: &'a [usize],
-    /// Lights; none is a white world.
+    /// Lights; none at all, not even a shining surface, is a white world.
     pub lights: &'a [Light],
+    /// What is computed for a camera ray.
+    pub integrator: &'a Integrator,
 }
 
 /// A finished picture.
@@ -101,7 +125,7 @@ pub struct RenderStats {
     pub dropped_samples: u64,
 }
 
-/// Renders the first look: direct light and one reflection.
+/// Renders a picture by the scene's integrator.
 ///
 /// Runs on the current rayon pool. `progress` is called with (tiles done, tiles in all), once per finished tile
 /// and in order, from any thread of the pool.
@@ -119,11 +143,11 @@ fn render_tiled(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Picture {
     let film = input.film;
-    let integrator = Beauty::new(input);
+    let integrator = integrator::prepare(input);
     let renderer = TileRenderer {
-        camera: PinholeCamera::new(input.camera, film.width, film.height),
+        camera: Eye::new(input.camera, film.width, film.height),
         filter: PixelFilter::blackman_harris(),
-        integrator: &integrator,
+        integrator: &*integrator,
         film,
     };
     let grid = TileGrid::new(film.width, film.height, tile_size);
@@ -177,5 +201,7 @@ impl Assembly {
     }
 }
 
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;

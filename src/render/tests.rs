@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::*;
 use crate::ray::{Aabb, Ray};
-use crate::scene::{Color, ToneCurve};
+use crate::scene::{Color, Scalar, ToneCurve};
 use crate::trace::INVALID_ID;
 
 /// The plane y = 0 (object 0) and perhaps a unit sphere at height 1 (object 1). A hit carries its point and normal.
@@ -86,6 +86,7 @@ impl Surfaces for Shapes {
         SurfacePoint {
             position,
             base_position: position,
+            base_normal: hit.ng.normalize(),
             geometric_normal: hit.ng.normalize(),
             shading_normal: hit.ng.normalize(),
             texcoord: Vec2::ZERO,
@@ -96,15 +97,28 @@ impl Surfaces for Shapes {
     fn object(&self, hit: &Hit) -> usize {
         hit.geom as usize
     }
+
+    fn placed(&self) -> Vec<PlacedObject> {
+        Vec::new()
+    }
+
+    fn area_element(&self, _: &Hit) -> Option<f32> {
+        None
+    }
+
+    fn tangents(&self, _: &Hit) -> Option<[Vec3; 2]> {
+        None
+    }
 }
 
 fn material(metallic: f32, roughness: f32, specular: f32) -> Material {
     Material {
         name: "white".into(),
         base_color: Color::Constant(Vec3::ONE),
-        metallic,
-        roughness,
-        specular,
+        metallic: Scalar::Constant(metallic),
+        roughness: Scalar::Constant(roughness),
+        specular: Scalar::Constant(specular),
+        ..Material::default()
     }
 }
 
@@ -115,6 +129,7 @@ struct Setup {
     film: Film,
     materials: Vec<Material>,
     lights: Vec<Light>,
+    integrator: Integrator,
 }
 
 impl Setup {
@@ -124,8 +139,8 @@ impl Setup {
             camera: Camera {
                 position: Vec3::new(0.0, 4.0, 3.0),
                 target: Vec3::ZERO,
-                up: Vec3::Y,
                 fov: 0.6,
+                ..Camera::default()
             },
             film: Film {
                 width: 45,
@@ -137,6 +152,7 @@ impl Setup {
             },
             materials: vec![white],
             lights,
+            integrator: Integrator::Beauty,
         }
     }
 
@@ -149,6 +165,7 @@ impl Setup {
             materials: &self.materials,
             object_materials: &[0, 0],
             lights: &self.lights,
+            integrator: &self.integrator,
         };
         super::render_tiled(&input, tile_size, &|_, _| ())
     }
@@ -302,6 +319,7 @@ fn progress_counts_every_tile_in_order() {
         materials: &scene.materials,
         object_materials: &[0, 0],
         lights: &scene.lights,
+        integrator: &scene.integrator,
     };
     let seen = Mutex::new(Vec::new());
     let picture = render(&input, &|done, total| {

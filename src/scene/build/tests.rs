@@ -3,8 +3,11 @@ use std::sync::Arc;
 
 use tempfile::TempDir;
 
+use glam::Vec3;
+
 use super::*;
 use crate::image::{write_png_gray16, write_png_rgb8};
+use crate::scene::Color;
 
 /// Two squares of two materials, the first displaced and coloured by its MTL.
 const OBJ: &str = "\
