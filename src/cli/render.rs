@@ -128,7 +128,7 @@ impl Job<'_> {
         let world = loaded.scene.world()?;
         let engine = self.engine.build(&world)?;
         let build = clock.lap();
-        let picture = self.render(&loaded, &world, &*engine);
+        let picture = self.render(&loaded, &world, &*engine)?;
         engine.check()?;
         let render = clock.lap();
         self.target.write(&picture, &loaded.scene.film)?;
@@ -165,25 +165,34 @@ impl Job<'_> {
         Ok(())
     }
 
-    fn render(&self, loaded: &Loaded, world: &World, engine: &dyn Engine) -> Picture {
+    fn render(
+        &self,
+        loaded: &Loaded,
+        world: &World,
+        engine: &dyn Engine,
+    ) -> Result<Picture, CliError> {
         let scene = &loaded.scene;
         let object_materials: Vec<usize> = scene.objects.iter().map(|o| o.material).collect();
+        let input = RenderInput {
+            tracer: engine.tracer(),
+            surfaces: world,
+            camera: &scene.camera,
+            film: &scene.film,
+            materials: &scene.materials,
+            object_materials: &object_materials,
+            lights: &scene.lights,
+            integrator: &scene.integrator,
+        };
+        if !scene.camera.allow_inside
+            && let Some(object) = crate::render::enclosing_object(&input)
+            && let Some(error) = loaded.camera_inside(object)
+        {
+            return Err(error.into());
+        }
         let progress = Progress::new(self.quiet);
-        let picture = crate::render::render(
-            &RenderInput {
-                tracer: engine.tracer(),
-                surfaces: world,
-                camera: &scene.camera,
-                film: &scene.film,
-                materials: &scene.materials,
-                object_materials: &object_materials,
-                lights: &scene.lights,
-                integrator: &scene.integrator,
-            },
-            &|done, total| progress.report(done, total),
-        );
+        let picture = crate::render::render(&input, &|done, total| progress.report(done, total));
         progress.finish();
-        picture
+        Ok(picture)
     }
 }
 

@@ -103,6 +103,12 @@ pub struct RenderInput<'a> {
     pub integrator: &'a Integrator,
 }
 
+/// The opaque object, if any, that the camera of `input` is inside of: its inner side is all that is seen in any
+/// direction.
+pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
+    integrator::enclosing_object(input)
+}
+
 /// A finished picture.
 #[derive(Clone, Debug)]
 pub struct Picture {

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::*;
 use crate::ray::{Aabb, Ray};
-use crate::scene::{Color, Scalar, ToneCurve};
+use crate::scene::{Color, PathLimits, Scalar, ToneCurve};
 use crate::trace::INVALID_ID;
 
 /// The plane y = 0 (object 0) and perhaps a unit sphere at height 1 (object 1). A hit carries its point and normal.
@@ -282,7 +282,14 @@ fn the_sky_exposes_well_at_exposure_zero() {
 #[test]
 fn the_same_bits_for_any_tiling_and_any_number_of_threads() {
     let lights = vec![sun(30.0), uniform_environment()];
-    let scene = Setup::new(true, material(0.3, 0.3, 0.5), lights);
+    let mut scene = Setup::new(true, material(0.3, 0.3, 0.5), lights);
+    for integrator in [Integrator::Beauty, Integrator::Path(PathLimits::default())] {
+        scene.integrator = integrator;
+        same_bits(&scene);
+    }
+}
+
+fn same_bits(scene: &Setup) {
     let bits = |threads, tile_size| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let picture = pool.unwrap().install(|| scene.render_tiled(tile_size));

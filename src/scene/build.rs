@@ -11,7 +11,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{Affine3A, Vec3};
 
 use super::error::{AssetError, SceneError};
 use super::file::{DisplacementTable, Keyed, LightTable, MeshTable, SCALE, SceneFile, default_sun};
@@ -43,6 +43,8 @@ pub struct Loaded {
     pub maps: Vec<MapFile>,
     /// What was mended on the way, one line each.
     pub warnings: Vec<String>,
+    /// Where the file places the camera, if it does.
+    eye: Option<Keyed<Vec3>>,
 }
 
 /// One mesh under one map, as named on a command line.
@@ -82,7 +84,20 @@ impl Loaded {
             lights => builder.lights(lights)?,
         };
         let camera = frame::camera(&file.camera, frame::bounds(&builder.objects))?;
-        Ok(builder.finish(path, camera, file.film, lights, file.integrator))
+        let loaded = builder.finish(path, camera, file.film, lights, file.integrator);
+        Ok(Self {
+            eye: file.camera.position,
+            ..loaded
+        })
+    }
+
+    /// The error that the camera is inside of this object; `None` where the file does not place the camera, since
+    /// what is framed is seen from outside.
+    pub fn camera_inside(&self, object: usize) -> Option<SceneError> {
+        let name = &self.scene.objects[object].name;
+        let found = format!("a point inside of {name:?}");
+        let expected = "a point outside of closed surfaces, or allow_inside = true for a room";
+        self.eye.as_ref().map(|eye| eye.refuse(found, expected))
     }
 
     /// The scene of one displaced mesh, seen by the default camera. The parts of the file become one object.
@@ -372,6 +387,7 @@ impl Builder {
         Loaded {
             maps: self.assets.into_maps(),
             warnings: self.warnings,
+            eye: None,
             scene: Scene {
                 path: path.to_owned(),
                 camera,

@@ -64,6 +64,11 @@ pub trait Integrator: Sync {
     fn radiance(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> Vec3;
 }
 
+/// The opaque object that the camera is inside of.
+pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
+    stage::Stage::new(input).enclosing_object(input.camera.position)
+}
+
 /// The integrator that a scene asks for.
 pub fn prepare<'a>(input: &RenderInput<'a>) -> Box<dyn Integrator + 'a> {
     match *input.integrator {

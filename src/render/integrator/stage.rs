@@ -158,6 +158,28 @@ impl<'a> Stage<'a> {
         around.into_iter().rev().fold(Bodies::default(), enter)
     }
 
+    /// The object whose inner side is met in all of 26 directions from `position`, if it is opaque.
+    pub fn enclosing_object(&self, position: Vec3) -> Option<usize> {
+        let steps = [-1.0, 0.0, 1.0];
+        let all = steps.map(|x| steps.map(|y| steps.map(|z| Vec3::new(x, y, z))));
+        let directions = all.into_iter().flatten().flatten();
+        let mut object = None;
+        for direction in directions.filter(|d| *d != Vec3::ZERO) {
+            // A little askew: rays along the axes of a scene graze its edges.
+            let askew = direction.normalize() + Vec3::new(0.013, 0.027, -0.019);
+            let met = self.meet(&Ray::new(position, askew.normalize()))?;
+            let here = self.surfaces.object(&met.hit);
+            let shut = !met.from_outside
+                && !met.material.is_transmissive()
+                && met.material.opacity.is(1.0);
+            if !shut || object.is_some_and(|o| o != here) {
+                return None;
+            }
+            object = Some(here);
+        }
+        object
+    }
+
     /// Whether the ray slips through a hole; the number of its surface so far keeps choices apart.
     pub fn slips(&self, met: &Met, crossing: u32, sampler: &Sampler) -> bool {
         if met.material.opacity.is(1.0) {

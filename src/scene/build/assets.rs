@@ -33,10 +33,7 @@ impl Assets {
         channel: &Channel,
         wrap: Wrap,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
-        let key = (identity(path), channel.clone(), wrap);
-        once(&mut self.heights, key, || {
-            image::load_heights(path, channel, wrap)
-        })
+        channel_once(&mut self.heights, path, channel, wrap)
     }
 
     /// A channel of a picture as a parameter of a material; apart from the heights, which are reported and edited.
@@ -46,10 +43,7 @@ impl Assets {
         channel: &Channel,
         wrap: Wrap,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
-        let key = (identity(path), channel.clone(), wrap);
-        once(&mut self.scalars, key, || {
-            image::load_heights(path, channel, wrap)
-        })
+        channel_once(&mut self.scalars, path, channel, wrap)
     }
 
     /// A colour picture, times `tint`.
@@ -78,6 +72,17 @@ impl Assets {
         maps.map(|((path, ..), map)| MapFile { path, map })
             .collect()
     }
+}
+
+/// A channel of a picture, known or loaded.
+fn channel_once(
+    known: &mut Vec<(ChannelKey, Arc<DisplacementMap>)>,
+    path: &Path,
+    channel: &Channel,
+    wrap: Wrap,
+) -> Result<Arc<DisplacementMap>, AssetError> {
+    let key = (identity(path), channel.clone(), wrap);
+    once(known, key, || image::load_heights(path, channel, wrap))
 }
 
 /// What `known` has for `key`, else what `load` gives. A scene names few files: no hashing is needed.
