@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use super::engine::EngineArgs;
 use super::error::CliError;
+use super::film::FilmArgs;
 use super::march::MarchArgs;
 use super::picture::Target;
-use super::render::{FilmArgs, Job};
+use super::render::Job;
 use crate::demo::{DEMOS, Demo};
 
 /// Make a ready scene and a picture of it
@@ -68,6 +69,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         scene: &scene,
         film: &args.film,
         integrator: None,
+        samples: None,
+        resume: false,
         march: &MarchArgs::default(),
         stats: None,
         engine: &args.engine,

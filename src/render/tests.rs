@@ -1,12 +1,14 @@
 //! Whole pictures of shapes whose answers are known.
 
+mod film;
+
 use std::sync::Mutex;
 
 use glam::{Vec2, Vec3};
 
 use super::*;
 use crate::ray::{Aabb, Ray};
-use crate::scene::{Color, PathLimits, Scalar, ToneCurve};
+use crate::scene::{Color, PathLimits, Scalar};
 use crate::trace::INVALID_ID;
 
 /// The plane y = 0 (object 0) and perhaps a unit sphere at height 1 (object 1). A hit carries its point and normal.
@@ -147,8 +149,7 @@ impl Setup {
                 height: 30,
                 spp: 4,
                 seed: 1,
-                exposure: 0.0,
-                tone: ToneCurve::Standard,
+                ..Film::default()
             },
             materials: vec![white],
             lights,
@@ -156,8 +157,8 @@ impl Setup {
         }
     }
 
-    fn render_tiled(&self, tile_size: u32) -> Picture {
-        let input = RenderInput {
+    fn input(&self) -> RenderInput<'_> {
+        RenderInput {
             tracer: &self.shapes,
             surfaces: &self.shapes,
             camera: &self.camera,
@@ -166,8 +167,29 @@ impl Setup {
             object_materials: &[0, 0],
             lights: &self.lights,
             integrator: &self.integrator,
+        }
+    }
+
+    /// Gives `frame` what it lacks, in tiles of this size.
+    fn go_on(&self, frame: &mut Frame, tile: u32) -> Outcome {
+        let control = Control {
+            tile: Some(tile),
+            ..Control::default()
         };
-        super::render_tiled(&input, tile_size, &|_, _| ())
+        render_frame(&self.input(), frame, control)
+    }
+
+    /// The film's window with the samples of these numbers.
+    fn frame(&self, samples: Range<u32>) -> Frame {
+        let mut frame = Frame::new(&self.film, samples, Objects::new(["plane", "sphere"]));
+        self.go_on(&mut frame, 16);
+        frame
+    }
+
+    fn render_tiled(&self, tile: u32) -> Picture {
+        let mut frame = Frame::new(&self.film, 0..self.film.spp, Objects::default());
+        let outcome = self.go_on(&mut frame, tile);
+        Picture::new(&frame, &outcome)
     }
 
     fn mean(&self) -> Vec3 {
@@ -318,18 +340,8 @@ fn seeds_differ() {
 #[test]
 fn progress_counts_every_tile_in_order() {
     let scene = Setup::new(false, material(0.0, 1.0, 0.0), vec![]);
-    let input = RenderInput {
-        tracer: &scene.shapes,
-        surfaces: &scene.shapes,
-        camera: &scene.camera,
-        film: &scene.film,
-        materials: &scene.materials,
-        object_materials: &[0, 0],
-        lights: &scene.lights,
-        integrator: &scene.integrator,
-    };
     let seen = Mutex::new(Vec::new());
-    let picture = render(&input, &|done, total| {
+    let picture = render(&scene.input(), &|done, total| {
         seen.lock().unwrap().push((done, total))
     });
     assert_eq!(*seen.lock().unwrap(), [(1, 2), (2, 2)]);

@@ -1,5 +1,6 @@
 //! Materials: a subset of the principled material, each parameter a value or a texture.
 
+use std::fmt;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -95,7 +96,7 @@ pub enum Scalar {
 }
 
 /// One channel of a picture, linear: 0 .. 1 for integer pictures, as stored for float ones.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct ScalarTexture {
     /// The channel, with its wrap mode.
     pub map: Arc<DisplacementMap>,
@@ -103,6 +104,17 @@ pub struct ScalarTexture {
     pub uv: UvTransform,
     /// Multiplies.
     pub factor: f32,
+}
+
+impl fmt::Debug for ScalarTexture {
+    /// The map as its size: texels would fill the screen.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ScalarTexture")
+            .field("size", &self.map.size())
+            .field("uv", &self.uv)
+            .field("factor", &self.factor)
+            .finish()
+    }
 }
 
 impl Scalar {
@@ -213,15 +225,22 @@ impl Material {
             let image = &texture.image;
             (Arc::as_ptr(image) as usize, image.bytes())
         };
-        let scalar = |texture: &ScalarTexture| {
-            let map = &texture.map;
-            (Arc::as_ptr(map) as usize, map.bytes())
-        };
         let colors = [&self.base_color, &self.sheen_color, &self.emission];
         let colors = colors.into_iter().filter_map(|c| match c {
             Color::Texture(texture) => Some(color(texture)),
             Color::Constant(_) => None,
         });
+        let detail = self.detail.iter().filter_map(|detail| match detail {
+            Detail::NormalMap { texture, .. } => Some(color(texture)),
+            Detail::Bump(_) => None,
+        });
+        let maps = self.maps().into_iter();
+        let maps = maps.map(|map| (Arc::as_ptr(map) as usize, map.bytes()));
+        colors.chain(detail).chain(maps).collect()
+    }
+
+    /// The channels of pictures that its numbers and its bump are read from.
+    pub fn maps(&self) -> Vec<&Arc<DisplacementMap>> {
         let scalars = [
             &self.metallic,
             &self.roughness,
@@ -233,14 +252,14 @@ impl Material {
             &self.opacity,
         ];
         let scalars = scalars.into_iter().filter_map(|s| match s {
-            Scalar::Texture(texture) => Some(scalar(texture)),
+            Scalar::Texture(texture) => Some(&texture.map),
             Scalar::Constant(_) => None,
         });
-        let detail = self.detail.iter().map(|detail| match detail {
-            Detail::NormalMap { texture, .. } => color(texture),
-            Detail::Bump(heights) => scalar(heights),
+        let bump = self.detail.iter().filter_map(|detail| match detail {
+            Detail::Bump(heights) => Some(&heights.map),
+            Detail::NormalMap { .. } => None,
         });
-        colors.chain(scalars).chain(detail).collect()
+        scalars.chain(bump).collect()
     }
 
     /// Whether it is a source of light.

@@ -6,6 +6,8 @@ mod build;
 mod camera;
 mod error;
 mod file;
+mod film;
+mod fingerprint;
 mod integrator;
 mod light;
 pub mod load;
@@ -23,38 +25,11 @@ use crate::surface::{BaseMesh, DisplacedSurface};
 pub use build::{Loaded, MapFile, MeshAndMap};
 pub use camera::{Camera, Lens, Projection};
 pub use error::{AssetError, Place, SceneError};
-pub(crate) use file::{MAX_SIDE, MAX_SPP, STEP_TEXELS, too_many_pixels};
+pub(crate) use file::{MAX_SIDE, MAX_SPP, MAX_STOPS, STEP_TEXELS, fits, too_many_pixels};
+pub use film::{Adaptive, Aov, AovSet, Film, Filter, FilterShape, ToneCurve, Window};
 pub use integrator::{Integrator, PathLimits, View};
 pub use light::Light;
 pub use material::{Color, Coordinates, Detail, Material, Scalar, ScalarTexture, Texture};
-
-/// How linear radiance becomes an 8-bit picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ToneCurve {
-    /// A filmic shoulder and toe, then sRGB.
-    #[default]
-    Filmic,
-    /// sRGB only, clipped.
-    Standard,
-}
-
-/// Size and sampling of the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Film {
-    /// Pixels across.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-    /// Samples per pixel, at least 1.
-    pub spp: u32,
-    /// Seed of all randomness.
-    pub seed: u32,
-    /// Stops: radiance is multiplied by 2^exposure.
-    pub exposure: f32,
-    /// For PNG; EXR stays linear.
-    pub tone: ToneCurve,
-}
 
 /// What an object is made of.
 #[derive(Clone, Debug)]

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::super::RenderInput;
 use super::super::basis::Basis;
 use super::super::bsdf::cosine_hemisphere;
+use super::super::film::CameraSample;
 use super::super::sampler::{Dimension, Purpose, Sampler};
 use super::stage::Stage;
 use super::{Integrator, RayCounts};
@@ -28,25 +29,28 @@ impl<'a> Ao<'a> {
 }
 
 impl Integrator for Ao<'_> {
-    fn radiance(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> Vec3 {
+    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample {
         rays.camera += 1;
         let Some(met) = self.stage.meet(camera_ray) else {
-            return Vec3::ONE;
+            return CameraSample::background(Vec3::ONE);
         };
         let point = self.stage.shade(camera_ray, &met, 1.0, 0.0);
         let dimension = Dimension::new(0, Purpose::Bounce);
         let local = cosine_hemisphere(sampler.point(dimension));
         let direction = Basis::around(point.shading_normal()).to_world(local);
-        if point.geometric_normal.dot(direction) <= 0.0 {
-            return Vec3::ZERO;
+        let mut open = 0.0;
+        if point.geometric_normal.dot(direction) > 0.0 {
+            let key = sampler.ray_key(dimension);
+            let ray = Ray {
+                tfar: self.distance,
+                ..self.stage.ray_from(&met.point, direction, key)
+            };
+            rays.shadow += 1;
+            open = self.stage.visibility(ray);
         }
-        let ray = Ray {
-            tfar: self.distance,
-            ..self
-                .stage
-                .ray_from(&met.point, direction, sampler.ray_key(dimension))
-        };
-        rays.shadow += 1;
-        Vec3::splat(self.stage.visibility(ray))
+        CameraSample {
+            radiance: Vec3::splat(open),
+            first: Some(self.stage.first_hit(&met, &point)),
+        }
     }
 }

@@ -6,10 +6,9 @@ mod path;
 mod stage;
 mod view;
 
-use glam::Vec3;
-
 use super::RenderInput;
 use super::bsdf::Bounce;
+use super::film::CameraSample;
 use super::sampler::Sampler;
 use crate::ray::Ray;
 use crate::scene;
@@ -60,8 +59,8 @@ impl std::ops::AddAssign for RayCounts {
 
 /// Estimates the radiance that arrives along a camera ray.
 pub trait Integrator: Sync {
-    /// One estimate. `sampler` is its only randomness; the rays it traces are added to `rays`.
-    fn radiance(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> Vec3;
+    /// One estimate, and what the ray met first. `sampler` is its only randomness; the rays it traces are added to `rays`.
+    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample;
 }
 
 /// The opaque object that the camera is inside of.

@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::super::RenderInput;
 use super::super::bsdf::{Allowed, Bounce, SMOOTHEST_WHEN_LAST};
+use super::super::film::{CameraSample, FirstHit};
 use super::super::light::{Lights, Receiver};
 use super::super::material;
 use super::super::sampler::{Dimension, Purpose, Sampler};
@@ -96,6 +97,8 @@ struct Walk<'s, 'r> {
     bounces: Bounces,
     /// Surfaces met.
     crossings: u32,
+    /// The first of them that was neither a hole nor a hidden boundary.
+    first: Option<FirstHit>,
     sampler: &'s Sampler,
     rays: &'r mut RayCounts,
 }
@@ -151,6 +154,9 @@ impl<'a> Path<'a> {
         }
         self.emission(walk, &met);
         let (point, allowed) = self.shade(walk, &met, eta);
+        if walk.first.is_none() {
+            walk.first = Some(self.stage.first_hit(&met, &point));
+        }
         self.direct(walk, &met, &point, allowed);
         self.go_on(walk, &met, &point, allowed, beyond)
     }
@@ -289,7 +295,7 @@ impl<'a> Path<'a> {
 }
 
 impl Integrator for Path<'_> {
-    fn radiance(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> Vec3 {
+    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample {
         rays.camera += 1;
         let mut walk = Walk {
             ray: *camera_ray,
@@ -300,11 +306,15 @@ impl Integrator for Path<'_> {
             departure: None,
             bounces: Bounces::default(),
             crossings: 0,
+            first: None,
             sampler,
             rays,
         };
         while walk.crossings < MOST_CROSSINGS && self.step(&mut walk) {}
-        walk.radiance
+        CameraSample {
+            radiance: walk.radiance,
+            first: walk.first,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::super::detail;
+use super::super::film::FirstHit;
 use super::super::material;
 use super::super::offset::RayOffset;
 use super::super::sampler::{Dimension, Purpose, Sampler};
@@ -86,6 +87,20 @@ impl<'a> Stage<'a> {
             None => met.point.shading_normal,
         };
         ShadedPoint::new(&met.point, normal, -ray.direction, parameters)
+    }
+
+    /// What the film is told of the first thing that a camera ray met.
+    pub fn first_hit(&self, met: &Met, shaded: &ShadedPoint) -> FirstHit {
+        let point = &met.point;
+        FirstHit {
+            albedo: shaded.bsdf().albedo(),
+            normal: point.shading_normal,
+            position: point.position,
+            texcoord: point.texcoord,
+            displacement: point.displacement,
+            object: self.surfaces.object(&met.hit),
+            prim: met.hit.prim,
+        }
     }
 
     /// A ray that leaves `point` in `direction`, on the side that this is on.

@@ -5,7 +5,9 @@ use std::time::Instant;
 use glam::Vec3;
 
 use super::super::RenderInput;
+use super::super::film::CameraSample;
 use super::super::sampler::Sampler;
+use super::super::shading::ShadedPoint;
 use super::stage::{Met, Stage};
 use super::{Integrator, RayCounts};
 use crate::ray::Ray;
@@ -44,7 +46,7 @@ impl<'a> Look<'a> {
         (0..TRIALS).map(trial).fold(f32::INFINITY, f32::min)
     }
 
-    fn show(&self, ray: &Ray, met: &Met) -> Vec3 {
+    fn show(&self, ray: &Ray, met: &Met, shaded: &ShadedPoint) -> Vec3 {
         let point = &met.point;
         let signed = |n: Vec3| 0.5 * (n + Vec3::ONE);
         match self.view {
@@ -52,11 +54,7 @@ impl<'a> Look<'a> {
             View::Geometric => signed(point.geometric_normal),
             View::Uv => (point.texcoord - point.texcoord.floor()).extend(0.0),
             View::Depth => Vec3::splat(met.hit.t / self.diagonal),
-            View::Albedo => self
-                .stage
-                .shade(ray, met, met.material.ior, 0.0)
-                .bsdf()
-                .albedo(),
+            View::Albedo => shaded.bsdf().albedo(),
             View::Displacement => {
                 let part = 0.5 * (100.0 * point.displacement / self.diagonal).clamp(-1.0, 1.0);
                 Vec3::new(0.5 + part, 0.5 - part.abs(), 0.5 - part)
@@ -68,12 +66,18 @@ impl<'a> Look<'a> {
 }
 
 impl Integrator for Look<'_> {
-    fn radiance(&self, camera_ray: &Ray, _: &Sampler, rays: &mut RayCounts) -> Vec3 {
+    fn sample(&self, camera_ray: &Ray, _: &Sampler, rays: &mut RayCounts) -> CameraSample {
         rays.camera += 1;
-        match (self.stage.meet(camera_ray), self.view) {
-            (Some(met), _) => self.show(camera_ray, &met),
-            (None, View::Cost) => heat(self.cost(camera_ray) / COST_UNIT),
-            (None, _) => Vec3::ZERO,
+        let Some(met) = self.stage.meet(camera_ray) else {
+            return CameraSample::background(match self.view {
+                View::Cost => heat(self.cost(camera_ray) / COST_UNIT),
+                _ => Vec3::ZERO,
+            });
+        };
+        let point = self.stage.shade(camera_ray, &met, met.material.ior, 0.0);
+        CameraSample {
+            radiance: self.show(camera_ray, &met, &point),
+            first: Some(self.stage.first_hit(&met, &point)),
         }
     }
 }

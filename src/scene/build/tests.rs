@@ -25,7 +25,7 @@ fn folder() -> TempDir {
     fs::write(path("two.obj"), OBJ).unwrap();
     fs::write(path("two.mtl"), MTL).unwrap();
     write_png_gray16(&path("height.png"), 2, 2, &[0, 65535, 65535, 0]).unwrap();
-    write_png_rgb8(&path("color.png"), 1, 1, &[[255, 0, 0]]).unwrap();
+    write_png_rgb8(&path("color.png"), 1, 1, &[[255, 0, 0]], &[]).unwrap();
     folder
 }
 

@@ -78,6 +78,22 @@ impl Integrator {
         })
     }
 
+    /// Its name in scene files.
+    pub(crate) fn name(&self) -> &'static str {
+        let is = |kind: Kind| match (self, kind) {
+            (Self::Path(_), Kind::Path)
+            | (Self::Beauty, Kind::Beauty)
+            | (Self::Ao { .. }, Kind::Ao) => true,
+            (Self::View(own), Kind::View(view)) => *own == view,
+            _ => false,
+        };
+        // Every integrator has a word there.
+        KINDS
+            .iter()
+            .find(|(_, kind)| is(*kind))
+            .map_or("", |(word, _)| word)
+    }
+
     /// The names of all integrators.
     pub(crate) fn names() -> impl Iterator<Item = &'static str> {
         KINDS.iter().map(|(word, _)| *word)

@@ -3,26 +3,25 @@
 //! The format is described in docs/scene.md. What is loaded from other files follows in `build`.
 
 mod camera;
+mod film;
 mod integrator;
 mod light;
 mod material;
 mod mesh;
 mod reader;
-mod view;
 
 use std::path::{Path, PathBuf};
 
 use super::error::{AssetError, Place, SceneError};
 use super::{Film, Integrator};
 pub(super) use camera::{CameraTable, ProjectionTable};
+pub(crate) use film::{MAX_SIDE, MAX_SPP, MAX_STOPS, fits, too_many_pixels};
 pub(super) use light::{LightTable, default_sun};
 pub(super) use material::{
     ColorTable, DetailTable, MaterialTable, ScalarTable, ScalarTextureTable, TextureTable,
 };
 pub(super) use mesh::{DisplacementTable, MeshTable, SCALE};
 use reader::{Item, Section, Source};
-
-pub(crate) use view::{MAX_SIDE, MAX_SPP, too_many_pixels};
 
 /// The least step of a march in texels, and the largest: beyond, a ray would take minutes or see nothing.
 pub(crate) const STEP_TEXELS: std::ops::RangeInclusive<f32> = 1e-3..=1e6;
@@ -87,7 +86,7 @@ impl SceneFile {
             camera: root
                 .optional("camera", CameraTable::read)?
                 .unwrap_or_default(),
-            film: root.optional("film", view::film)?.unwrap_or_default(),
+            film: root.optional("film", film::film)?.unwrap_or_default(),
             meshes: tables(&mut root, "mesh", |item| MeshTable::read(item, folder))?,
             materials: tables(&mut root, "material", |item| {
                 MaterialTable::read(item, folder)

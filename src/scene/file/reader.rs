@@ -153,14 +153,12 @@ impl<'a> Item<'a> {
 
     /// A whole number in `range`.
     pub fn integer(&self, range: std::ops::RangeInclusive<u32>) -> Result<u32, SceneError> {
-        let found = match &self.value {
-            DeValue::Integer(i) => u32::from_str_radix(i.as_str(), i.radix()).ok(),
-            _ => None,
-        };
-        found.filter(|i| range.contains(i)).ok_or_else(|| {
-            let (low, high) = (range.start(), range.end());
-            self.refuse(format!("a whole number from {low} to {high}"))
-        })
+        as_u32(&self.value)
+            .filter(|i| range.contains(i))
+            .ok_or_else(|| {
+                let (low, high) = (range.start(), range.end());
+                self.refuse(format!("a whole number from {low} to {high}"))
+            })
     }
 
     /// True or false.
@@ -260,13 +258,30 @@ impl<'a> Item<'a> {
         matches!(self.value, DeValue::Array(_))
     }
 
+    /// An array of `N` whole numbers that u32 can hold.
+    pub fn integers<const N: usize>(&self) -> Option<[u32; N]> {
+        self.array(as_u32)
+    }
+
     fn numbers<const N: usize>(&self) -> Option<[f32; N]> {
+        self.array(as_f32)
+    }
+
+    fn array<T, const N: usize>(&self, read: fn(&DeValue) -> Option<T>) -> Option<[T; N]> {
         let DeValue::Array(array) = &self.value else {
             return None;
         };
-        let numbers = array.iter().map(|v| as_f32(v.get_ref()));
-        let numbers: Vec<f32> = numbers.collect::<Option<_>>()?;
-        numbers.try_into().ok()
+        let items = array.iter().map(|v| read(v.get_ref()));
+        let items: Vec<T> = items.collect::<Option<_>>()?;
+        items.try_into().ok()
+    }
+}
+
+/// A whole number that u32 can hold, else `None`.
+fn as_u32(value: &DeValue) -> Option<u32> {
+    match value {
+        DeValue::Integer(i) => u32::from_str_radix(i.as_str(), i.radix()).ok(),
+        _ => None,
     }
 }
 
