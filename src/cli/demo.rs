@@ -69,6 +69,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         scene: &scene,
         film: &args.film,
         set: &[],
+        integrator: None,
         samples: None,
         resume: false,
         march: &MarchArgs::default(),

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use clap::builder::PossibleValuesParser;
 use serde::Serialize;
 
 use super::engine::{Engine, EngineArgs};
@@ -20,7 +21,7 @@ use super::progress::Progress;
 use crate::image::{OutputError, atomic};
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
 use crate::render::{Control, Outcome, RayCounts, RenderInput};
-use crate::scene::{AovSet, Film, Loaded, Scene};
+use crate::scene::{AovSet, Film, Integrator, Loaded, Scene};
 use crate::trace::World;
 
 /// Render a scene file to a picture
@@ -50,6 +51,9 @@ pub struct Args {
     /// given again
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// What is computed, instead of the scene's integrator
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Integrator::names()))]
+    integrator: Option<String>,
     /// Samples A to B - 1 of those of every pixel, to be merged with others [default: all]
     #[arg(long, value_name = "A..B", value_parser = parse::samples)]
     samples: Option<Range<u32>>,
@@ -78,6 +82,8 @@ pub struct Job<'a> {
     pub film: &'a FilmArgs,
     /// Values that win over the scene's, and lose to other options.
     pub set: &'a [String],
+    /// The name of an integrator that wins over the scene's.
+    pub integrator: Option<&'a str>,
     /// Which samples; `None` for all.
     pub samples: Option<Range<u32>>,
     /// Go on with the picture if it is there.
@@ -110,6 +116,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         target,
         film: &args.film,
         set: &args.set,
+        integrator: args.integrator.as_deref(),
         samples: args.samples.clone(),
         resume: args.resume,
         march: &args.march,
@@ -127,6 +134,9 @@ impl Job<'_> {
         let mut loaded = Loaded::from_file_with(self.scene, self.set)?;
         super::warn(&loaded.warnings);
         self.film.apply(&mut loaded.scene.film)?;
+        if let Some(integrator) = self.integrator.and_then(Integrator::named) {
+            loaded.scene.integrator = integrator;
+        }
         self.march.apply(&mut loaded.scene, false)?;
         let Some(mut begun) = self.begin(&mut loaded.scene)? else {
             return self.say(&format!("{} is complete", self.target.path().display()));
@@ -195,7 +205,7 @@ impl Job<'_> {
         let source = Source {
             name: self.scene.display().to_string(),
             hash: scene.fingerprint(),
-            integrator: "beauty".into(),
+            integrator: scene.integrator.name().into(),
             backend: String::new(), // not built yet
         };
         let objects = Objects::new(scene.objects.iter().map(|object| &object.name[..]));
@@ -253,6 +263,22 @@ impl Job<'_> {
     ) -> Result<Outcome, CliError> {
         let scene = &loaded.scene;
         let object_materials: Vec<usize> = scene.objects.iter().map(|o| o.material).collect();
+        let input = RenderInput {
+            tracer: engine.tracer(),
+            surfaces: world,
+            camera: &scene.camera,
+            film: &scene.film,
+            materials: &scene.materials,
+            object_materials: &object_materials,
+            lights: &scene.lights,
+            integrator: &scene.integrator,
+        };
+        if !scene.camera.allow_inside
+            && let Some(object) = crate::render::enclosing_object(&input)
+            && let Some(error) = loaded.camera_inside(object)
+        {
+            return Err(error.into());
+        }
         let progress = Progress::new(self.quiet);
         let broken = AtomicBool::new(false);
         let mut error = None;
@@ -268,15 +294,6 @@ impl Job<'_> {
             stop: &|| interrupt.signal().is_some() || broken.load(Ordering::Relaxed),
             pass: Some(&mut show),
             tile: None,
-        };
-        let input = RenderInput {
-            tracer: engine.tracer(),
-            surfaces: world,
-            camera: &scene.camera,
-            film: &scene.film,
-            materials: &scene.materials,
-            object_materials: &object_materials,
-            lights: &scene.lights,
         };
         let outcome = crate::render::render_frame(&input, frame, control);
         progress.finish();
@@ -330,7 +347,9 @@ struct Seconds {
 struct Rays {
     camera: u64,
     shadow: u64,
+    diffuse: u64,
     reflection: u64,
+    refraction: u64,
     total: u64,
 }
 
@@ -339,7 +358,9 @@ impl From<&RayCounts> for Rays {
         Self {
             camera: rays.camera,
             shadow: rays.shadow,
+            diffuse: rays.diffuse,
             reflection: rays.reflection,
+            refraction: rays.refraction,
             total: rays.total(),
         }
     }

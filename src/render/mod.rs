@@ -9,9 +9,10 @@
 //! whatever the number of threads and the order of tiles. Radiance is linear RGB with Rec. 709 primaries.
 
 mod basis;
+mod bsdf;
 mod camera;
+mod detail;
 pub mod film;
-mod ggx;
 mod integrator;
 mod light;
 mod material;
@@ -29,11 +30,10 @@ pub use film::to_srgb8;
 pub use integrator::RayCounts;
 pub use offset::RayOffset;
 
-use crate::scene::{Camera, Film, Light, Material};
+use crate::scene::{Camera, Film, Integrator, Light, Material};
 use crate::surface::SurfacePoint;
-use crate::trace::{Hit, Tracer, World};
+use crate::trace::{Hit, PlacedObject, Tracer, World};
 use film::{Frame, Objects, TileGrid, TileRenderer};
-use integrator::Beauty;
 
 /// Most pixels along a tile's side.
 const TILE: u32 = 32;
@@ -47,6 +47,16 @@ pub trait Surfaces: Sync {
 
     /// Index of the object that was hit.
     fn object(&self, hit: &Hit) -> usize;
+
+    /// Every object once per place where it stands, by rising top-level ids: where light may come from.
+    fn placed(&self) -> Vec<PlacedObject>;
+
+    /// |dS/du x dS/dv| there, square world units; `None` where (u, v) are no barycentric coordinates.
+    fn area_element(&self, hit: &Hit) -> Option<f32>;
+
+    /// dP/ds and dP/dt of the undisplaced surface along its texture coordinates, world space; `None` where it has
+    /// none.
+    fn tangents(&self, hit: &Hit) -> Option<[Vec3; 2]>;
 }
 
 impl Surfaces for World {
@@ -56,6 +66,18 @@ impl Surfaces for World {
 
     fn object(&self, hit: &Hit) -> usize {
         self.resolve(hit).object
+    }
+
+    fn placed(&self) -> Vec<PlacedObject> {
+        World::placed(self)
+    }
+
+    fn area_element(&self, hit: &Hit) -> Option<f32> {
+        World::area_element(self, hit)
+    }
+
+    fn tangents(&self, hit: &Hit) -> Option<[Vec3; 2]> {
+        World::tangents(self, hit)
     }
 }
 
@@ -74,8 +96,16 @@ pub struct RenderInput<'a> {
     pub materials: &'a [Material],
     /// Per object of the world an index into `materials`.
     pub object_materials: &'a [usize],
-    /// Lights; none is a white world.
+    /// Lights; none at all, not even a shining surface, is a white world.
     pub lights: &'a [Light],
+    /// What is computed for a camera ray.
+    pub integrator: &'a Integrator,
+}
+
+/// The opaque object, if any, that the camera of `input` is inside of: its inner side is all that is seen in any
+/// direction.
+pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
+    integrator::enclosing_object(input)
 }
 
 /// A finished picture.
@@ -100,7 +130,7 @@ pub struct RenderStats {
     pub dropped_samples: u64,
 }
 
-/// Renders the first look: direct light and one reflection; of the film's crop window, all samples.
+/// Renders the film's crop window by the scene's integrator, all samples.
 ///
 /// Runs on the current rayon pool. `progress` is called with (tiles done, tiles in all), once per finished tile
 /// and in order, from any thread of the pool.
@@ -173,8 +203,8 @@ pub struct Outcome {
 /// # Panics
 /// As [`render()`].
 pub fn render_frame(input: &RenderInput, frame: &mut Frame, mut control: Control) -> Outcome {
-    let integrator = Beauty::new(input);
-    let renderer = TileRenderer::new(input.camera, input.film, &integrator);
+    let integrator = integrator::prepare(input);
+    let renderer = TileRenderer::new(input.camera, input.film, &*integrator);
     let passes = passes(frame.samples(), input.film.progressive);
     let grids = passes.iter().map(|pass| {
         let side = control.tile.unwrap_or_else(|| tile_side(pass.len() as u32));
@@ -243,5 +273,7 @@ fn tile_side(spp: u32) -> u32 {
     (TILE_SAMPLES / spp.max(1)).isqrt().clamp(1, TILE)
 }
 
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;

@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 
 use super::*;
 use crate::ray::{Aabb, Ray};
-use crate::scene::Color;
+use crate::scene::{Color, PathLimits, Scalar};
 use crate::trace::INVALID_ID;
 
 /// The plane y = 0 (object 0) and perhaps a unit sphere at height 1 (object 1). A hit carries its point and normal.
@@ -88,6 +88,7 @@ impl Surfaces for Shapes {
         SurfacePoint {
             position,
             base_position: position,
+            base_normal: hit.ng.normalize(),
             geometric_normal: hit.ng.normalize(),
             shading_normal: hit.ng.normalize(),
             texcoord: Vec2::ZERO,
@@ -98,15 +99,28 @@ impl Surfaces for Shapes {
     fn object(&self, hit: &Hit) -> usize {
         hit.geom as usize
     }
+
+    fn placed(&self) -> Vec<PlacedObject> {
+        Vec::new()
+    }
+
+    fn area_element(&self, _: &Hit) -> Option<f32> {
+        None
+    }
+
+    fn tangents(&self, _: &Hit) -> Option<[Vec3; 2]> {
+        None
+    }
 }
 
 fn material(metallic: f32, roughness: f32, specular: f32) -> Material {
     Material {
         name: "white".into(),
         base_color: Color::Constant(Vec3::ONE),
-        metallic,
-        roughness,
-        specular,
+        metallic: Scalar::Constant(metallic),
+        roughness: Scalar::Constant(roughness),
+        specular: Scalar::Constant(specular),
+        ..Material::default()
     }
 }
 
@@ -117,6 +131,7 @@ struct Setup {
     film: Film,
     materials: Vec<Material>,
     lights: Vec<Light>,
+    integrator: Integrator,
 }
 
 impl Setup {
@@ -126,8 +141,8 @@ impl Setup {
             camera: Camera {
                 position: Vec3::new(0.0, 4.0, 3.0),
                 target: Vec3::ZERO,
-                up: Vec3::Y,
                 fov: 0.6,
+                ..Camera::default()
             },
             film: Film {
                 width: 45,
@@ -138,6 +153,7 @@ impl Setup {
             },
             materials: vec![white],
             lights,
+            integrator: Integrator::Beauty,
         }
     }
 
@@ -150,6 +166,7 @@ impl Setup {
             materials: &self.materials,
             object_materials: &[0, 0],
             lights: &self.lights,
+            integrator: &self.integrator,
         }
     }
 
@@ -287,7 +304,14 @@ fn the_sky_exposes_well_at_exposure_zero() {
 #[test]
 fn the_same_bits_for_any_tiling_and_any_number_of_threads() {
     let lights = vec![sun(30.0), uniform_environment()];
-    let scene = Setup::new(true, material(0.3, 0.3, 0.5), lights);
+    let mut scene = Setup::new(true, material(0.3, 0.3, 0.5), lights);
+    for integrator in [Integrator::Beauty, Integrator::Path(PathLimits::default())] {
+        scene.integrator = integrator;
+        same_bits(&scene);
+    }
+}
+
+fn same_bits(scene: &Setup) {
     let bits = |threads, tile_size| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let picture = pool.unwrap().install(|| scene.render_tiled(tile_size));

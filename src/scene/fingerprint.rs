@@ -5,7 +5,7 @@ use std::fmt::{self, Write};
 use glam::Affine3A;
 use twox_hash::xxhash3_128::Hasher;
 
-use super::{ObjectShape, Scene, SceneObject};
+use super::{Material, ObjectShape, Scene, SceneObject};
 use crate::surface::{BaseMesh, DisplacedSurface, DisplacementMap};
 
 impl Scene {
@@ -20,6 +20,7 @@ impl Scene {
             objects,
             materials,
             lights,
+            integrator,
         } = self;
         let mut digest = Digest(Hasher::new());
         digest.debug(camera);
@@ -27,6 +28,10 @@ impl Scene {
             digest.object(object);
         }
         digest.debug(materials);
+        for map in materials.iter().flat_map(Material::maps) {
+            digest.map(map);
+        }
+        digest.debug(integrator);
         digest.debug(lights);
         format!("{:032x}", digest.0.finish_128())
     }

@@ -6,14 +6,14 @@ use super::filter::PixelFilter;
 use super::frame::{Frame, pixels};
 use super::pixel::Pixel;
 use super::sample::FirstHit;
-use crate::render::camera::PinholeCamera;
+use crate::render::camera::Eye;
 use crate::render::integrator::{Integrator, RayCounts};
 use crate::render::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::{Camera, Film, Window};
 
 /// All that turns a tile into pixels.
 pub struct TileRenderer<'a> {
-    camera: PinholeCamera,
+    camera: Eye,
     /// Depth is measured along this from the eye.
     view: Vec3,
     eye: Vec3,
@@ -36,7 +36,7 @@ impl<'a> TileRenderer<'a> {
     /// Pictures of `film` through `camera`.
     pub fn new(camera: &Camera, film: &Film, integrator: &'a dyn Integrator) -> Self {
         Self {
-            camera: PinholeCamera::new(camera, film.width, film.height),
+            camera: Eye::new(camera, film.width, film.height),
             view: (camera.target - camera.position).normalize_or(Vec3::NEG_Z),
             eye: camera.position,
             filter: PixelFilter::new(film.filter),
@@ -82,7 +82,8 @@ impl<'a> TileRenderer<'a> {
         let sampler = Sampler::new(place, index, self.seed);
         let placement = self.filter.place(index, sampler.point(dimension));
         let centre = place.as_vec2() + Vec2::splat(0.5);
-        let mut ray = self.camera.ray(centre + placement.offset);
+        let lens = sampler.point(Dimension::new(0, Purpose::Lens));
+        let mut ray = self.camera.ray(centre + placement.offset, lens);
         ray.key = sampler.ray_key(dimension);
         let mut sample = self.integrator.sample(&ray, &sampler, rays);
         sample.radiance = clamped(sample.radiance, self.clamp);
@@ -191,18 +192,12 @@ mod tests {
         }
     }
 
-    const CAMERA: Camera = Camera {
-        position: Vec3::ZERO,
-        target: Vec3::NEG_Z,
-        up: Vec3::Y,
-        fov: 1.0,
-    };
-
     #[test]
     fn a_broken_sample_is_counted_and_never_spreads() {
         let film = film();
         let mut frame = Frame::new(&film, 0..32, Objects::default());
-        let outcome = TileRenderer::new(&CAMERA, &film, &Broken).render(&mut frame, 32, &|| false);
+        let outcome =
+            TileRenderer::new(&Camera::default(), &film, &Broken).render(&mut frame, 32, &|| false);
         assert!(frame.radiance().iter().all(|&p| p == Vec3::ONE));
         assert_eq!(outcome.rays.camera, 8 * 8 * 32);
         assert!(frame.is_complete() && !outcome.stopped);
@@ -213,7 +208,7 @@ mod tests {
     #[test]
     fn a_stopped_tile_goes_on_to_the_same_bits() {
         let film = film();
-        let renderer = TileRenderer::new(&CAMERA, &film, &Broken);
+        let renderer = TileRenderer::new(&Camera::default(), &film, &Broken);
         let mut whole = Frame::new(&film, 0..32, Objects::default());
         let mut stopped = whole.clone();
         renderer.render(&mut whole, 32, &|| false);

@@ -2,24 +2,29 @@
 //!
 //! The format is described in docs/scene.md. What is loaded from other files follows in `build`.
 
+mod camera;
 mod film;
+mod integrator;
+mod light;
+mod material;
 mod mesh;
 mod overrides;
 mod reader;
-mod shading;
-mod view;
 
 use std::path::{Path, PathBuf};
 
-use super::Film;
 use super::error::{AssetError, Place, SceneError};
+use super::{Film, Integrator};
+pub(super) use camera::{CameraTable, ProjectionTable};
 pub(crate) use film::{MAX_SIDE, MAX_SPP, MAX_STOPS, fits, too_many_pixels};
+pub(super) use light::{LightTable, default_sun};
+pub(super) use material::{
+    ColorTable, DetailTable, MaterialTable, ScalarTable, ScalarTextureTable, TextureTable,
+};
 pub(super) use mesh::{DisplacementTable, MeshTable, SCALE};
 pub(super) use overrides::OPTION;
 use overrides::Override;
 use reader::{Item, Section, Source};
-pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, default_sun};
-pub(super) use view::CameraTable;
 
 /// The least step of a march in texels, and the largest: beyond, a ray would take minutes or see nothing.
 pub(crate) const STEP_TEXELS: std::ops::RangeInclusive<f32> = 1e-3..=1e6;
@@ -32,6 +37,7 @@ pub(super) struct SceneFile {
     pub meshes: Vec<MeshTable>,
     pub materials: Vec<MaterialTable>,
     pub lights: Vec<LightTable>,
+    pub integrator: Integrator,
 }
 
 /// A value that a later step may still refuse: it remembers its key and place.
@@ -81,7 +87,8 @@ impl SceneFile {
             text,
             overrides: &overrides,
         };
-        let mut root = source.parse(&["camera", "film", "mesh", "material", "light"])?;
+        let mut root =
+            source.parse(&["camera", "film", "mesh", "material", "light", "integrator"])?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Ok(Self {
             camera: root
@@ -93,6 +100,9 @@ impl SceneFile {
                 MaterialTable::read(item, folder)
             })?,
             lights: tables(&mut root, "light", |item| LightTable::read(item, folder))?,
+            integrator: root
+                .optional("integrator", integrator::read)?
+                .unwrap_or_default(),
         })
         .and_then(|scene| scene.checked(&root))
     }
@@ -171,6 +181,18 @@ fn uv_transform(item: Item) -> Result<crate::surface::UvTransform, SceneError> {
         uv.offset = offset;
     }
     Ok(uv)
+}
+
+/// A channel of a picture.
+fn channel(item: Item) -> Result<crate::image::Channel, SceneError> {
+    let expected = "\"luminance\", \"r\", \"g\", \"b\", \"a\" or the name of an EXR channel";
+    let Ok(channel) = item.text(expected)?.parse();
+    Ok(channel)
+}
+
+/// A factor of at least 0.
+fn factor(item: Item) -> Result<f32, SceneError> {
+    item.number("a factor of at least 0", |x| x >= 0.0)
 }
 
 /// A number from 0 to 1.
