@@ -37,12 +37,7 @@ pub struct Args {
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let target = Target::new(&args.output)?;
-    let files = args
-        .parts
-        .iter()
-        .map(|path| Ok((path.clone(), FrameFile::read(path)?)));
-    let files = files.collect::<Result<Vec<_>, CliError>>()?;
-    let Some(FrameFile { frame, info }) = merge(files)? else {
+    let Some(FrameFile { frame, info }) = merge(&args.parts)? else {
         return Err(CliError::Usage("no files to merge".into()));
     };
     let mut film = Film::default();

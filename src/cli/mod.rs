@@ -19,6 +19,7 @@ mod progress;
 mod query;
 mod rays;
 mod render;
+mod stats;
 
 use std::process::ExitCode;
 

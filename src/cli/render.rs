@@ -4,10 +4,8 @@ use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 use clap::builder::PossibleValuesParser;
-use serde::Serialize;
 
 use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
@@ -18,9 +16,10 @@ use super::memory::Memory;
 use super::parse;
 use super::picture::Target;
 use super::progress::Progress;
-use crate::image::{OutputError, atomic};
+use super::stats::{Clock, Seconds, Stats};
+use crate::image::atomic;
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
-use crate::render::{Control, Outcome, RayCounts, RenderInput};
+use crate::render::{Control, Outcome, RenderInput};
 use crate::scene::{AovSet, Film, Integrator, Loaded, Scene};
 use crate::trace::World;
 
@@ -176,7 +175,7 @@ impl Job<'_> {
                 write,
                 total: clock.total(),
             },
-            rays: Rays::from(&outcome.rays),
+            rays: (&outcome.rays).into(),
             mrays_per_second: outcome.rays.total() as f64 / render.max(1e-9) / 1e6,
             dropped_samples: frame.dropped(),
             memory: Memory::of(&loaded, &world, engine.tracer()),
@@ -305,115 +304,5 @@ impl Job<'_> {
             return Ok(());
         }
         writeln!(std::io::stdout(), "{line}").map_err(CliError::stdout)
-    }
-}
-
-/// What `--stats` writes.
-#[derive(Serialize)]
-struct Stats {
-    version: &'static str,
-    scene: String,
-    picture: String,
-    backend: String,
-    simd: &'static str,
-    threads: usize,
-    width: u32,
-    height: u32,
-    spp: u32,
-    /// Samples in the picture, over all pixels.
-    samples: u64,
-    seed: u32,
-    /// Whether a signal ended the run.
-    partial: bool,
-    seconds: Seconds,
-    rays: Rays,
-    /// All rays over the time of rendering.
-    mrays_per_second: f64,
-    dropped_samples: u64,
-    memory: Memory,
-}
-
-/// Wall-clock time by phase.
-#[derive(Serialize)]
-struct Seconds {
-    load: f64,
-    build: f64,
-    render: f64,
-    write: f64,
-    total: f64,
-}
-
-#[derive(Serialize)]
-struct Rays {
-    camera: u64,
-    shadow: u64,
-    diffuse: u64,
-    reflection: u64,
-    refraction: u64,
-    total: u64,
-}
-
-impl From<&RayCounts> for Rays {
-    fn from(rays: &RayCounts) -> Self {
-        Self {
-            camera: rays.camera,
-            shadow: rays.shadow,
-            diffuse: rays.diffuse,
-            reflection: rays.reflection,
-            refraction: rays.refraction,
-            total: rays.total(),
-        }
-    }
-}
-
-impl Stats {
-    fn write(&self, path: &Path) -> Result<(), OutputError> {
-        atomic::write(path, |file| {
-            serde_json::to_writer_pretty(&mut *file, self)?;
-            writeln!(file)
-        })
-    }
-
-    fn summary(&self) -> String {
-        let Self {
-            picture,
-            width,
-            height,
-            spp,
-            mrays_per_second,
-            ..
-        } = self;
-        let seconds = self.seconds.total;
-        format!(
-            "{picture}: {width}x{height}, {spp} spp, {seconds:.2} s, {mrays_per_second:.2} Mrays/s"
-        )
-    }
-}
-
-/// Measures phases one after the other.
-struct Clock {
-    start: Instant,
-    lap: Instant,
-}
-
-impl Clock {
-    fn start() -> Self {
-        let now = Instant::now();
-        Self {
-            start: now,
-            lap: now,
-        }
-    }
-
-    /// Seconds since the last lap.
-    fn lap(&mut self) -> f64 {
-        let now = Instant::now();
-        let seconds = (now - self.lap).as_secs_f64();
-        self.lap = now;
-        seconds
-    }
-
-    fn total(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
     }
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use exr::block::reader::{ChunksReader, Reader};
 use exr::block::{self, UncompressedBlock};
 use exr::math::Vec2;
-use exr::meta::attribute::{AttributeValue, SampleType};
+use exr::meta::attribute::{AttributeValue, ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use exr::prelude::f16;
 
@@ -95,38 +95,40 @@ impl ExrFile {
         })
     }
 
-    /// All channels of the first layer, and its texts.
-    pub fn read_all(self) -> Result<ExrPicture, ImageError> {
-        let header = self.reader.headers()[0].clone();
-        self.check_layout(&header)?;
-        let (width, height) = (header.layer_size.width(), header.layer_size.height());
-        let planes = self.planes(0, &header, (0..header.channels.list.len()).collect())?;
-        let channels = header.channels.list.iter().zip(planes);
-        let attributes = header
-            .own_attributes
-            .other
-            .iter()
-            .filter_map(|(name, value)| {
-                let AttributeValue::Text(value) = value else {
-                    return None;
-                };
-                Some((name.to_string(), value.to_string()))
-            });
+    /// What the first layer is, without its channels.
+    pub fn describe(&self) -> ExrPicture {
+        let header = &self.reader.headers()[0];
+        let attributes = header.own_attributes.other.iter();
+        let attributes = attributes.filter_map(|(name, value)| match value {
+            AttributeValue::Text(value) => Some((name.to_string(), value.to_string())),
+            _ => None,
+        });
         let Vec2(x, y) = header.own_attributes.layer_position;
         let display = header.shared_attributes.display_window;
-        Ok(ExrPicture {
+        ExrPicture {
             display: (display.size.width(), display.size.height()),
             position: (x, y),
-            width,
-            height,
-            channels: channels
-                .map(|(channel, samples)| ExrChannel {
-                    name: channel.name.to_string(),
-                    samples,
-                })
-                .collect(),
+            width: header.layer_size.width(),
+            height: header.layer_size.height(),
+            channels: Vec::new(),
             attributes: attributes.collect(),
-        })
+        }
+    }
+
+    /// All channels of the first layer, and its texts.
+    pub fn read_all(self) -> Result<ExrPicture, ImageError> {
+        let mut picture = self.describe();
+        let header = self.reader.headers()[0].clone();
+        self.check_layout(&header)?;
+        let channels = &header.channels.list;
+        self.check_length(picture.width * picture.height * channels.len())?;
+        let planes = self.planes(0, &header, (0..channels.len()).collect())?;
+        let channel = |(channel, samples): (&ChannelDescription, _)| ExrChannel {
+            name: channel.name.to_string(),
+            samples,
+        };
+        picture.channels = channels.iter().zip(planes).map(channel).collect();
+        Ok(picture)
     }
 
     /// These channels of a layer, in this order.
@@ -138,7 +140,6 @@ impl ExrFile {
     ) -> Result<Vec<ExrSamples>, ImageError> {
         let (width, height) = (header.layer_size.width(), header.layer_size.height());
         let wanted = channels.len();
-        self.check_length(width * height * wanted)?;
         let plane = |&channel: &usize| match header.channels.list[channel].sample_type {
             SampleType::U32 => ExrSamples::U32(vec![0; width * height]),
             SampleType::F16 | SampleType::F32 => ExrSamples::F32(vec![0.0; width * height]),
@@ -171,8 +172,8 @@ impl ExrFile {
 
     /// Refuses a file far too short for so many samples before memory is taken for them.
     fn check_length(&self, samples: usize) -> Result<(), ImageError> {
-        /// No codec of EXR packs better.
-        const MOST_SAMPLES_PER_BYTE: u64 = 1 << 10;
+        /// Far more than any codec of EXR packs, of one colour too.
+        const MOST_SAMPLES_PER_BYTE: u64 = 1 << 16;
         let bytes = std::fs::metadata(&self.path).map_or(u64::MAX, |file| file.len());
         if samples as u64 / MOST_SAMPLES_PER_BYTE > bytes {
             let reason = format!("{bytes} bytes cannot hold {samples} samples");
@@ -257,10 +258,19 @@ fn decode<const N: usize, T>(row: &mut [T], bytes: &[u8], sample: impl Fn([u8; N
     }
 }
 
-/// Reads all channels of the first layer of the EXR file at `path`, and its text attributes. Signed windows are kept.
+/// Reads all channels of the first layer of the EXR file at `path`, and its text attributes.
 pub fn read_exr(path: &Path) -> Result<ExrPicture, ImageError> {
+    open(path)?.read_all()
+}
+
+/// As [`read_exr`], without the channels: a few bytes of the file.
+pub fn read_exr_header(path: &Path) -> Result<ExrPicture, ImageError> {
+    Ok(open(path)?.describe())
+}
+
+fn open(path: &Path) -> Result<ExrFile, ImageError> {
     match super::format::open(path)? {
-        (Format::Exr, file) => ExrFile::open(path, file)?.read_all(),
+        (Format::Exr, file) => ExrFile::open(path, file),
         (other, _) => Err(ImageError::decode(
             path,
             Format::Exr,

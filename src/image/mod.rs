@@ -25,7 +25,7 @@ pub use channel::Channel;
 pub use color::{ColorImage, ColorPixels, ColorSpace, load_color};
 pub use environment::{EnvironmentImage, load_environment};
 pub use error::ImageError;
-pub use exr_file::read_exr;
+pub use exr_file::{read_exr, read_exr_header};
 pub use exr_picture::{ExrChannel, ExrPicture, ExrSamples};
 pub use format::Format;
 pub use heights::load_heights;

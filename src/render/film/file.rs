@@ -16,7 +16,9 @@ use super::info::{FrameInfo, attribute};
 use super::objects::{Objects, layer_key};
 use super::pixel::Pixel;
 use super::slot::{Layout, MEANS};
-use crate::image::{ExrChannel, ExrPicture, ExrSamples, OutputError, read_exr, write_exr_picture};
+use crate::image::{
+    ExrChannel, ExrPicture, ExrSamples, OutputError, read_exr, read_exr_header, write_exr_picture,
+};
 use crate::scene::{Aov, AovSet};
 
 const AOVS: &str = "prismarch/aovs";
@@ -66,9 +68,7 @@ impl FrameFile {
     /// Reads what [`Frame::write`] wrote. The frame knows neither film nor scene: [`Frame::go_on_with`].
     pub fn read(path: &Path) -> Result<Self, FrameError> {
         let picture = read_exr(path)?;
-        let size = UVec2::new(picture.display.0 as u32, picture.display.1 as u32);
-        let info = FrameInfo::read(path, size, &picture.attributes)?;
-        check_window(path, &picture, &info)?;
+        let info = info(path, &picture)?;
         let layout = Arc::new(Layout::new(aovs(path, &picture.attributes)?));
         let objects = if layout.aovs().has(Aov::Object) {
             let name = object_attribute("manifest");
@@ -86,6 +86,11 @@ impl FrameFile {
         );
         fill(path, &mut frame, &picture, !info.is_final())?;
         Ok(Self { frame, info })
+    }
+
+    /// What the file at `path` tells of its picture; the pixels are not looked at.
+    pub fn read_info(path: &Path) -> Result<FrameInfo, FrameError> {
+        info(path, &read_exr_header(path)?)
     }
 
     /// Fails unless this, read from `path`, is what was left of `new`, which is begun from the file `scene`.
@@ -126,6 +131,13 @@ fn aovs(path: &Path, attributes: &[(String, String)]) -> Result<AovSet, FrameErr
         found: format!("{names:?}"),
         expected: "names of AOVs".into(),
     })
+}
+
+fn info(path: &Path, picture: &ExrPicture) -> Result<FrameInfo, FrameError> {
+    let size = UVec2::new(picture.display.0 as u32, picture.display.1 as u32);
+    let info = FrameInfo::read(path, size, &picture.attributes)?;
+    check_window(path, picture, &info)?;
+    Ok(info)
 }
 
 /// Fails unless the file's pixels are those that its parts name.

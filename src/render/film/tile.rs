@@ -9,14 +9,14 @@ use super::sample::FirstHit;
 use crate::render::camera::Eye;
 use crate::render::integrator::{Integrator, RayCounts};
 use crate::render::sampler::{Dimension, Purpose, Sampler};
-use crate::scene::{Camera, Film, Window};
+use crate::scene::{Camera, Film, Projection, Window};
 
 /// All that turns a tile into pixels.
 pub struct TileRenderer<'a> {
     camera: Eye,
-    /// Depth is measured along this from the eye.
-    view: Vec3,
     eye: Vec3,
+    /// Depth is measured along this from the eye; from a panorama it is the distance.
+    view: Option<Vec3>,
     filter: PixelFilter,
     integrator: &'a dyn Integrator,
     seed: u32,
@@ -37,8 +37,9 @@ impl<'a> TileRenderer<'a> {
     pub fn new(camera: &Camera, film: &Film, integrator: &'a dyn Integrator) -> Self {
         Self {
             camera: Eye::new(camera, film.width, film.height),
-            view: (camera.target - camera.position).normalize_or(Vec3::NEG_Z),
             eye: camera.position,
+            view: (camera.projection != Projection::Panorama)
+                .then(|| (camera.target - camera.position).normalize_or(Vec3::NEG_Z)),
             filter: PixelFilter::new(film.filter),
             integrator,
             seed: film.seed,
@@ -87,7 +88,7 @@ impl<'a> TileRenderer<'a> {
         ray.key = sampler.ray_key(dimension);
         let mut sample = self.integrator.sample(&ray, &sampler, rays);
         sample.radiance = clamped(sample.radiance, self.clamp);
-        let depth = |hit: FirstHit| (hit.position - self.eye).dot(self.view);
+        let depth = |hit: FirstHit| self.depth(hit.position);
         let object = |hit: FirstHit| tile.objects().hash(hit.object);
         pixel.add(
             &sample,
@@ -95,6 +96,14 @@ impl<'a> TileRenderer<'a> {
             sample.first.map_or(0.0, depth),
             sample.first.map_or(0, object),
         );
+    }
+}
+
+impl TileRenderer<'_> {
+    fn depth(&self, position: Vec3) -> f32 {
+        let from_eye = position - self.eye;
+        self.view
+            .map_or_else(|| from_eye.length(), |view| from_eye.dot(view))
     }
 }
 
@@ -223,6 +232,16 @@ mod tests {
         }
         assert_eq!(rounds, (8 * 8 * 32_usize).div_ceil(100));
         assert_eq!(stopped, whole);
+    }
+
+    #[test]
+    fn depth_is_along_the_view_but_for_panoramas() {
+        let mut camera = Camera::default();
+        let aside = Vec3::new(3.0, 0.0, -4.0);
+        let depth = |camera: &Camera| TileRenderer::new(camera, &film(), &Broken).depth(aside);
+        assert_eq!(depth(&camera), 4.0);
+        camera.projection = Projection::Panorama;
+        assert_eq!(depth(&camera), 5.0);
     }
 
     #[test]

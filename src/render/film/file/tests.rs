@@ -81,6 +81,12 @@ fn rendered(film: &Film, corners: [u32; 4], samples: Range<u32>) -> FrameFile {
     FrameFile { frame, info }
 }
 
+/// Files put together.
+fn merged(files: &[(PathBuf, FrameFile)]) -> Result<Option<FrameFile>, FrameError> {
+    let paths: Vec<PathBuf> = files.iter().map(|(path, _)| path.clone()).collect();
+    merge(&paths)
+}
+
 /// Through a file and back.
 fn stored(folder: &TempDir, name: &str, file: &FrameFile) -> (PathBuf, FrameFile) {
     let path = folder.path().join(name);
@@ -146,7 +152,7 @@ fn a_frame_with_samples_to_come_is_kept_to_the_last_bit() {
     let (path, read) = stored(&folder, "partial.exr", &some);
     assert!(read.info.partial);
     assert!(matches!(
-        merge(vec![(path, read)]),
+        merged(&[(path, read)]),
         Err(FrameError::Partial { .. })
     ));
 }
@@ -163,7 +169,8 @@ fn tiles_merged_are_the_whole_to_the_bit() {
             &rendered(&film(), corners, 0..SPP),
         )
     });
-    let merged = merge(tiles.collect()).unwrap().unwrap();
+    let tiles: Vec<_> = tiles.collect();
+    let merged = merged(&tiles).unwrap().unwrap();
     assert_eq!(merged.info, whole.info);
     assert_eq!(bits(&folder, &merged), bits(&folder, &whole));
 }
@@ -183,7 +190,7 @@ fn runs_of_samples_merged_are_the_whole_to_rounding() {
             })
             .collect();
         runs.reverse();
-        let merged = merge(runs).unwrap().unwrap();
+        let merged = merged(&runs).unwrap().unwrap();
         assert_eq!(merged.info.parts.len(), 1);
         assert!(merged.info.is_final());
         let merged = bits(&folder, &merged);
@@ -206,7 +213,7 @@ fn more_samples_can_be_added_to_a_finished_picture() {
     let few = Film { spp: 5, ..film() };
     let first = stored(&folder, "first.exr", &rendered(&few, WHOLE, 0..5));
     let rest = stored(&folder, "rest.exr", &rendered(&film(), WHOLE, 5..SPP));
-    let merged = merge(vec![rest, first]).unwrap().unwrap();
+    let merged = merged(&[rest, first]).unwrap().unwrap();
     let whole = rendered(&film(), WHOLE, 0..SPP);
     assert_eq!(merged.info, whole.info);
     for (merged, whole) in merged
@@ -224,7 +231,7 @@ fn gaps_stay_gaps_and_can_be_filled_later() {
     let folder = tempfile::tempdir().unwrap();
     let tile = |corners, name: &str| stored(&folder, name, &rendered(&film(), corners, 0..SPP));
     let corners = vec![tile([0, 0, 2, 2], "a.exr"), tile([5, 3, 7, 5], "b.exr")];
-    let gapped = merge(corners).unwrap().unwrap();
+    let gapped = merged(&corners).unwrap().unwrap();
     assert_eq!(gapped.info.parts.len(), 2);
     let gapped = stored(&folder, "gapped.exr", &gapped);
     assert_eq!(gapped.1.frame.radiance()[3], Vec3::ZERO);
@@ -234,9 +241,8 @@ fn gaps_stay_gaps_and_can_be_filled_later() {
         ([5, 2, 7, 3], "e.exr"),
     ];
     let rest = rest.map(|(corners, name)| tile(corners, name));
-    let merged = merge(rest.into_iter().chain([gapped]).collect())
-        .unwrap()
-        .unwrap();
+    let files: Vec<_> = rest.into_iter().chain([gapped]).collect();
+    let merged = merged(&files).unwrap().unwrap();
     let whole = rendered(&film(), WHOLE, 0..SPP);
     assert_eq!(bits(&folder, &merged), bits(&folder, &whole));
     assert_eq!(merged.info, whole.info);
@@ -246,10 +252,15 @@ fn gaps_stay_gaps_and_can_be_filled_later() {
 fn what_does_not_belong_together_is_refused() {
     let left = rendered(&film(), [0, 0, 3, 5], 0..SPP);
     let right = rendered(&film(), [3, 0, 7, 5], 0..SPP);
+    let folder = tempfile::tempdir().unwrap();
     let error = |left: &FrameFile, right: &FrameFile| {
         let files = [("left.exr", left), ("right.exr", right)];
-        let files = files.map(|(name, file)| (PathBuf::from(name), file.clone()));
-        merge(files.to_vec()).unwrap_err().to_string()
+        let files = files.map(|(name, file)| {
+            let path = folder.path().join(name);
+            file.frame.write(&path, &file.info).unwrap();
+            path
+        });
+        merge(&files).unwrap_err().to_string()
     };
     for name in ["scene_hash", "version", "seed", "filter", "integrator"] {
         let mut odd = right.clone();
@@ -279,7 +290,7 @@ fn what_does_not_belong_together_is_refused() {
         twice.contains("samples 4..6 of the pixels 2,1,3,5"),
         "{twice}"
     );
-    assert!(merge(Vec::new()).unwrap().is_none());
+    assert!(merge(&[]).unwrap().is_none());
     let part = |start, samples| Part {
         window: window(start),
         samples,
