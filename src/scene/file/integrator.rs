@@ -79,7 +79,7 @@ impl Integrator {
     }
 
     /// Its name in scene files.
-    pub(crate) fn name(&self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         let is = |kind: Kind| match (self, kind) {
             (Self::Path(_), Kind::Path)
             | (Self::Beauty, Kind::Beauty)
