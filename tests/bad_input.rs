@@ -122,10 +122,7 @@ fn truncated_files_are_refused() {
 
 /// Writes `flat.exr` of one channel and 64 columns.
 fn exr(folder: &Folder, heights: &[f32]) {
-    let channel = ExrChannel {
-        name: "Y".into(),
-        samples: heights.to_vec(),
-    };
+    let channel = ExrChannel::floats("Y", heights.to_vec());
     write_exr(
         &folder.path("flat.exr"),
         64,

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use super::engine::EngineArgs;
 use super::error::CliError;
+use super::film::FilmArgs;
 use super::march::MarchArgs;
 use super::picture::Target;
-use super::render::{FilmArgs, Job};
+use super::render::Job;
 use crate::demo::{DEMOS, Demo};
 
 /// Make a ready scene and a picture of it
@@ -67,6 +68,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         target: Target::new(&scene.with_extension("png"))?,
         scene: &scene,
         film: &args.film,
+        set: &[],
+        integrator: None,
+        samples: None,
+        resume: false,
         march: &MarchArgs::default(),
         stats: None,
         engine: &args.engine,

@@ -5,10 +5,12 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::interrupt::EXIT_BASE;
 use super::rays::RayError;
 use crate::demo::WriteDemoError;
 use crate::image::OutputError;
 use crate::prism::MarchError;
+use crate::render::film::FrameError;
 use crate::scene::{AssetError, SceneError};
 
 /// Exit code of wrong usage; clap's own.
@@ -32,6 +34,9 @@ pub enum CliError {
     /// How a surface is to be marched.
     #[error(transparent)]
     March(#[from] MarchError),
+    /// A picture to go on with or to merge.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
     /// The ray table.
     #[error(transparent)]
     Rays(#[from] RayError),
@@ -50,6 +55,19 @@ pub enum CliError {
         threads: usize,
         /// Why.
         source: rayon::ThreadPoolBuildError,
+    },
+    /// Signals could not be caught.
+    #[error("cannot catch signals: {0}")]
+    Signals(io::Error),
+    /// A signal ended the run before its end; what was done is written.
+    #[error("interrupted; {} is partial{}", path.display(), resume_hint(*.resumable))]
+    Interrupted {
+        /// The signal.
+        signal: i32,
+        /// The picture.
+        path: PathBuf,
+        /// Whether the file can be gone on with.
+        resumable: bool,
     },
     /// A file could not be written.
     #[error(transparent)]
@@ -73,6 +91,10 @@ pub enum CliError {
     ReaderGone,
 }
 
+fn resume_hint(resumable: bool) -> &'static str {
+    if resumable { ", --resume goes on" } else { "" }
+}
+
 impl From<AssetError> for CliError {
     fn from(error: AssetError) -> Self {
         Self::Asset(Box::new(error))
@@ -84,8 +106,13 @@ impl CliError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::PictureFormat { .. } => USAGE,
-            Self::Scene(_) | Self::Asset(_) | Self::March(_) | Self::Rays(_) => INPUT,
-            Self::Backend { .. } | Self::Threads { .. } => FAILED,
+            Self::Scene(error) if error.is_override() => USAGE,
+            Self::Scene(_) | Self::Asset(_) | Self::March(_) | Self::Frame(_) | Self::Rays(_) => {
+                INPUT
+            }
+            Self::Backend { .. } | Self::Threads { .. } | Self::Signals(_) => FAILED,
+            // Signals are small numbers.
+            Self::Interrupted { signal, .. } => (EXIT_BASE + signal) as u8,
             Self::Output(_) | Self::Demo(_) | Self::Stdout(_) => OUTPUT,
             Self::ReaderGone => 0,
         }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::scene::{Color, Light, Loaded, ObjectShape};
+use crate::scene::{Light, Loaded, Material, ObjectShape};
 use crate::trace::{Shape, Tracer, World};
 
 /// Bytes by part.
@@ -97,20 +97,13 @@ fn mesh_bytes(loaded: &Loaded) -> usize {
 }
 
 fn picture_bytes(loaded: &Loaded) -> usize {
-    let textures = loaded
-        .scene
-        .materials
-        .iter()
-        .filter_map(|m| match &m.base_color {
-            Color::Texture(t) => Some((t.image.as_ref() as *const _ as usize, t.image.bytes())),
-            Color::Constant(_) => None,
-        });
+    let textures = loaded.scene.materials.iter().flat_map(Material::pictures);
     let environments = loaded.scene.lights.iter().filter_map(|light| match light {
         Light::Environment { image, .. } => {
             let bytes = size_of_val(&image.pixels[..]);
             Some((image.as_ref() as *const _ as usize, bytes))
         }
-        Light::Sun { .. } | Light::Sky { .. } => None,
+        _ => None,
     });
     let mut by_address: Vec<(usize, usize)> = textures.chain(environments).collect();
     by_address.sort_unstable();

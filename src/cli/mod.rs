@@ -1,21 +1,25 @@
 //! The command line: one file per verb.
 //!
-//! Exit codes: 0 done, 1 the machine failed us, 2 usage, 3 bad input, 4 output. Results go to stdout, everything else
+//! Exit codes: 0 done, 1 the machine failed us, 2 usage, 3 bad input, 4 output, 128 + n interrupted by signal n. Results go to stdout, everything else
 //! to stderr. Files appear complete or not at all.
 
 mod demo;
 mod engine;
 mod error;
+mod film;
 mod hits;
 mod info;
+mod interrupt;
 mod march;
 mod memory;
+mod merge;
 mod parse;
 mod picture;
 mod progress;
 mod query;
 mod rays;
 mod render;
+mod stats;
 
 use std::process::ExitCode;
 
@@ -28,10 +32,12 @@ const AFTER_HELP: &str = "\
 Examples:
   prismarch demo                                   make a cratered asteroid and a picture of it
   prismarch render scene.toml -o rock.png          render a scene
+  prismarch merge a.exr b.exr -o whole.exr         put parts of a picture together
   prismarch info scene.toml                        triangles, maps, memory
   prismarch query --mesh m.obj --map h.png --scale 0.1 --rays rays.csv -o hits.csv
 
-Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input, 4 output could not be written.
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input, 4 output could not be written,
+128 + n interrupted by signal n (what is done is written).
 `prismarch VERB --help` tells more of a verb.";
 
 /// Ray traces displaced surfaces without tessellating them.
@@ -48,6 +54,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Verb {
     Render(render::Args),
+    Merge(merge::Args),
     Query(query::Args),
     Info(info::Args),
     Demo(demo::Args),
@@ -71,6 +78,7 @@ pub fn main() -> ExitCode {
 fn run(verb: Verb) -> Result<(), CliError> {
     match verb {
         Verb::Render(args) => render::run(&args),
+        Verb::Merge(args) => merge::run(&args),
         Verb::Query(args) => query::run(&args),
         Verb::Info(args) => info::run(&args),
         Verb::Demo(args) => demo::run(&args),

@@ -1,6 +1,13 @@
 //! Values of options, checked as they are parsed.
 
-use crate::scene::{MAX_SIDE, STEP_TEXELS, too_many_pixels};
+use std::ops::Range;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use glam::UVec2;
+
+use crate::scene::{
+    Aov, AovSet, Filter, MAX_SIDE, MAX_SPP, MAX_STOPS, STEP_TEXELS, Window, too_many_pixels,
+};
 
 /// `WxH`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +31,84 @@ pub fn size(text: &str) -> Result<Size, String> {
         Some((found, most)) => Err(format!("{found}; expected at most {most} pixels")),
         None => Ok(Size { width, height }),
     }
+}
+
+/// `x0,y0,x1,y1`.
+pub fn window(text: &str) -> Result<Window, String> {
+    let corners = text.split(',').map(|x| x.trim().parse().ok());
+    let corners: Option<Vec<u32>> = corners.collect();
+    match corners.as_deref() {
+        Some(&[x0, y0, x1, y1]) if x0 < x1 && y0 < y1 => Ok(Window {
+            start: UVec2::new(x0, y0),
+            end: UVec2::new(x1, y1),
+        }),
+        _ => Err("expected pixels x0,y0,x1,y1 from the top left, with x0 < x1 and y0 < y1".into()),
+    }
+}
+
+/// `A..B`: A, ..., B - 1.
+pub fn samples(text: &str) -> Result<Range<u32>, String> {
+    let ends = text.split_once("..");
+    let number = |s: &str| s.parse().ok().filter(|&n: &u32| n <= MAX_SPP);
+    let ends = ends.and_then(|(a, b)| Some((number(a)?, number(b)?)));
+    ends.filter(|(a, b)| a < b)
+        .map(|(a, b)| a..b)
+        .ok_or_else(|| {
+            format!("expected A..B with A < B, like 0..16: samples A to B - 1, at most {MAX_SPP}")
+        })
+}
+
+/// A number above 0, or none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit(pub Option<f32>);
+
+/// A number above 0, or `off`.
+pub fn limit(text: &str) -> Result<Limit, String> {
+    if text == "off" {
+        return Ok(Limit(None));
+    }
+    let number = finite(text).ok().filter(|&x| x > 0.0);
+    let limit = number.map(|x| Limit(Some(x)));
+    limit.ok_or_else(|| "expected a number above 0, or off".into())
+}
+
+/// Half the width of a filter.
+pub fn filter_radius(text: &str) -> Result<f32, String> {
+    let number = finite(text).ok().filter(|x| Filter::RADII.contains(x));
+    number.ok_or_else(|| {
+        let (low, high) = (Filter::RADII.start(), Filter::RADII.end());
+        format!("expected pixels from {low} to {high}")
+    })
+}
+
+/// Stops of exposure.
+pub fn stops(text: &str) -> Result<f32, String> {
+    let number = finite(text).ok().filter(|x| x.abs() <= MAX_STOPS);
+    number.ok_or_else(|| format!("expected stops from -{MAX_STOPS} to {MAX_STOPS}"))
+}
+
+/// Names with commas between, `all` or `none`.
+pub fn aovs(text: &str) -> Result<AovSet, String> {
+    let known = |name: &str| Aov::NAMES.iter().find(|(known, _)| *known == name);
+    match text {
+        "all" => Ok(AovSet::ALL),
+        "none" => Ok(AovSet::NONE),
+        _ => {
+            let aovs = text.split(',').map(|name| Some(known(name.trim())?.1));
+            let aovs: Option<AovSet> = aovs.collect();
+            aovs.ok_or_else(|| format!("expected all, none, or some of {}", AovSet::ALL))
+        }
+    }
+}
+
+/// One of a few words.
+pub fn word<T: Copy + Send + Sync>(
+    words: &'static [(&'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(words.iter().map(|(word, _)| *word)).try_map(move |found| {
+        let word = words.iter().find(|(word, _)| *word == found);
+        word.map(|&(_, meaning)| meaning).ok_or("unknown")
+    })
 }
 
 /// A finite number.
@@ -81,6 +166,53 @@ mod tests {
         ] {
             assert!(size(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn windows_and_runs_of_samples_are_not_empty() {
+        assert_eq!(
+            window("1,2, 3,4").map(|w| w.to_string()),
+            Ok("1,2,3,4".into())
+        );
+        for bad in [
+            "",
+            "1,2,3",
+            "1,2,3,4,5",
+            "1,2,1,4",
+            "3,2,1,4",
+            "-1,0,2,2",
+            "a,0,2,2",
+            "1.5,0,2,2",
+        ] {
+            assert!(window(bad).is_err(), "{bad}");
+        }
+        assert_eq!(samples("16..64"), Ok(16..64));
+        for bad in [
+            "",
+            "4",
+            "4..4",
+            "5..4",
+            "..4",
+            "4..",
+            "-1..4",
+            "0..1048577",
+            "0...4",
+        ] {
+            assert!(samples(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn limits_can_be_off_and_lists_of_aovs_are_names() {
+        assert_eq!(limit("off"), Ok(Limit(None)));
+        assert_eq!(limit("2.5"), Ok(Limit(Some(2.5))));
+        for bad in ["", "0", "-1", "nan", "inf", "on"] {
+            assert!(limit(bad).is_err(), "{bad}");
+        }
+        assert_eq!(aovs("N, Z").map(|a| a.to_string()), Ok("N Z".into()));
+        assert_eq!(aovs("none"), Ok(AovSet::NONE));
+        assert!(aovs("").is_err() && aovs("n").is_err() && aovs("all,N").is_err());
+        assert!(filter_radius("0").is_err() && stops("65").is_err());
     }
 
     #[test]

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use crate::image::{ExrChannel, atomic, write_exr, write_png_rgb8};
-use crate::render::{Picture, to_srgb8};
+use crate::image::{atomic, write_png_rgb8};
+use crate::render::film::{Frame, FrameInfo};
+use crate::render::to_srgb8;
 use crate::scene::Film;
 
 /// A file that a picture can be written to.
@@ -14,7 +15,7 @@ pub struct Target {
     format: Format,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Png,
     Exr,
@@ -49,25 +50,26 @@ impl Target {
         &self.path
     }
 
-    /// Writes the picture: PNG with exposure and tone curve, EXR as linear radiance.
-    pub fn write(&self, picture: &Picture, film: &Film) -> Result<(), CliError> {
-        let (width, height) = (picture.width as usize, picture.height as usize);
-        // Files are written from the bottom row up, the picture starts at the top.
-        let from_bottom = picture.pixels.chunks_exact(width).rev().flatten();
-        match self.format {
-            Format::Png => {
-                let encode = |&radiance| to_srgb8(radiance, film.exposure, film.tone);
-                let pixels: Vec<_> = from_bottom.map(encode).collect();
-                write_png_rgb8(&self.path, width, height, &pixels)?;
-            }
-            Format::Exr => {
-                let pixels: Vec<_> = from_bottom.map(|radiance| radiance.to_array()).collect();
-                let channels = ExrChannel::rgb(None, &pixels).into();
-                let renderer = concat!("prismarch ", env!("CARGO_PKG_VERSION"));
-                let attributes = [("renderer", renderer)];
-                write_exr(&self.path, width, height, channels, &attributes)?;
-            }
+    /// Whether the file can hold more than a picture to look at: it can be merged and gone on with.
+    pub fn keeps_all(&self) -> bool {
+        self.format == Format::Exr
+    }
+
+    /// Writes the picture: PNG with exposure and tone curve, EXR as linear radiance with all that is beside it.
+    pub fn write(&self, frame: &Frame, info: &FrameInfo, film: &Film) -> Result<(), CliError> {
+        if self.keeps_all() {
+            frame.write(&self.path, info)?;
+            return Ok(());
         }
+        let size = frame.window().size();
+        let (width, height) = (size.x as usize, size.y as usize);
+        let radiance = frame.radiance();
+        // Files are written from the bottom row up, the picture starts at the top.
+        let from_bottom = radiance.chunks_exact(width).rev().flatten();
+        let encode = |&radiance| to_srgb8(radiance, film.exposure, film.tone);
+        let pixels: Vec<_> = from_bottom.map(encode).collect();
+        let texts = info.attributes();
+        write_png_rgb8(&self.path, width, height, &pixels, &texts)?;
         Ok(())
     }
 }

@@ -1,32 +1,41 @@
 //! `prismarch render`: a scene file becomes a picture.
 
 use std::io::Write;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use serde::Serialize;
+use clap::builder::PossibleValuesParser;
 
 use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
+use super::film::FilmArgs;
+use super::interrupt::Interrupt;
 use super::march::MarchArgs;
 use super::memory::Memory;
-use super::parse::{self, Size};
+use super::parse;
 use super::picture::Target;
 use super::progress::Progress;
-use crate::image::{OutputError, atomic};
-use crate::render::{Picture, RenderInput, RenderStats};
-use crate::scene::{Film, Loaded, MAX_SPP};
+use super::stats::{Clock, Seconds, Stats};
+use crate::image::atomic;
+use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
+use crate::render::{Control, Outcome, RenderInput};
+use crate::scene::{AovSet, Film, Integrator, Loaded, Scene};
 use crate::trace::World;
 
 /// Render a scene file to a picture
 ///
-/// The format of scene files is described in docs/scene.md. The picture is a PNG (filmic tone curve, 8-bit sRGB) or an
-/// EXR (linear radiance, 32-bit float), by the ending of its name. It is the same to the bit for any number of threads.
+/// The format of scene files is described in docs/scene.md. The picture is a PNG (tone curve, 8-bit sRGB) or an EXR (linear
+/// radiance, 32-bit float, and what --aovs names), by the ending of its name; docs/render.md describes both. It is the same to the bit
+/// for any number of threads. Ctrl-C and SIGTERM write what is done and end with 128 + the signal's number.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   prismarch render scene.toml
   prismarch render scene.toml -o rock.exr --size 1920x1080 --spp 256
+  prismarch render scene.toml -o left.exr --crop 0,0,320,480
+  prismarch render scene.toml -o second.exr --samples 16..32 --spp 64
+  prismarch render scene.toml -o rock.exr --resume
   prismarch render scene.toml --march uniform --dt 0.5
   prismarch render scene.toml --lod cone --spp 1
   prismarch render scene.toml --backend bvh --threads 4 --stats stats.json --quiet")]
@@ -38,6 +47,19 @@ pub struct Args {
     output: Option<PathBuf>,
     #[command(flatten)]
     film: FilmArgs,
+    /// A key of the scene file with another value, like film.spp=64, light.0.strength=2 or material.rock.roughness=0.2; may be
+    /// given again
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// What is computed, instead of the scene's integrator
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Integrator::names()))]
+    integrator: Option<String>,
+    /// Samples A to B - 1 of those of every pixel, to be merged with others [default: all]
+    #[arg(long, value_name = "A..B", value_parser = parse::samples)]
+    samples: Option<Range<u32>>,
+    /// Go on with the output if it is there: an EXR file of the same scene and options that was interrupted
+    #[arg(long)]
+    resume: bool,
     #[command(flatten)]
     march: MarchArgs,
     /// Write times, ray counts and memory as JSON
@@ -50,20 +72,6 @@ pub struct Args {
     quiet: bool,
 }
 
-/// What is taken instead of the scene's film settings.
-#[derive(Clone, Debug, clap::Args)]
-pub struct FilmArgs {
-    /// Width and height in pixels, instead of the scene's
-    #[arg(long, value_name = "WxH", value_parser = parse::size)]
-    pub size: Option<Size>,
-    /// Samples per pixel, instead of the scene's
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SPP)))]
-    pub spp: Option<u32>,
-    /// Seed of all randomness, instead of the scene's
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u32>,
-}
-
 /// Everything that a run of the renderer needs.
 pub struct Job<'a> {
     /// Scene file.
@@ -72,6 +80,14 @@ pub struct Job<'a> {
     pub target: Target,
     /// Film settings that win over the scene's.
     pub film: &'a FilmArgs,
+    /// Values that win over the scene's, and lose to other options.
+    pub set: &'a [String],
+    /// The name of an integrator that wins over the scene's.
+    pub integrator: Option<&'a str>,
+    /// Which samples; `None` for all.
+    pub samples: Option<Range<u32>>,
+    /// Go on with the picture if it is there.
+    pub resume: bool,
     /// Marches that win over the scene's.
     pub march: &'a MarchArgs,
     /// Where the statistics go.
@@ -99,6 +115,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         scene: &args.scene,
         target,
         film: &args.film,
+        set: &args.set,
+        integrator: args.integrator.as_deref(),
+        samples: args.samples.clone(),
+        resume: args.resume,
         march: &args.march,
         stats: args.stats.as_deref(),
         engine: &args.engine,
@@ -111,20 +131,32 @@ impl Job<'_> {
     /// Loads, builds, renders, writes, and says so in one line.
     pub fn run(&self) -> Result<(), CliError> {
         let mut clock = Clock::start();
-        let mut loaded = Loaded::from_file(self.scene)?;
+        let mut loaded = Loaded::from_file_with(self.scene, self.set)?;
         super::warn(&loaded.warnings);
-        self.film.apply(&mut loaded.scene.film);
+        self.film.apply(&mut loaded.scene.film)?;
+        if let Some(integrator) = self.integrator.and_then(Integrator::named) {
+            loaded.scene.integrator = integrator;
+        }
         self.march.apply(&mut loaded.scene, false)?;
+        let Some(mut begun) = self.begin(&mut loaded.scene)? else {
+            return self.say(&format!("{} is complete", self.target.path().display()));
+        };
         let load = clock.lap();
         let world = loaded.scene.world()?;
         world.set_spread(self.march.spread(&loaded.scene));
         let engine = self.engine.build(&world)?;
+        begun.info.backend = engine.tracer().name();
         let build = clock.lap();
-        let picture = self.render(&loaded, &world, &*engine);
+        let interrupt = Interrupt::catch()?;
+        let outcome = self.render(&loaded, &world, &*engine, &mut begun, &interrupt)?;
         engine.check()?;
         let render = clock.lap();
-        self.target.write(&picture, &loaded.scene.film)?;
+        let FrameFile { frame, info } = &mut begun;
+        info.partial = outcome.stopped && !frame.is_complete();
+        self.target.write(frame, info, &loaded.scene.film)?;
         let write = clock.lap();
+        let film = &loaded.scene.film;
+        let size = frame.window().size();
         let stats = Stats {
             version: env!("CARGO_PKG_VERSION"),
             scene: self.scene.display().to_string(),
@@ -132,10 +164,12 @@ impl Job<'_> {
             backend: engine.tracer().name(),
             simd: crate::prism::SimdLevel::detect().name(),
             threads: rayon::current_num_threads(),
-            width: picture.width,
-            height: picture.height,
-            spp: loaded.scene.film.spp,
-            seed: loaded.scene.film.seed,
+            width: size.x,
+            height: size.y,
+            spp: film.spp,
+            samples: frame.taken(),
+            seed: film.seed,
+            partial: info.partial,
             seconds: Seconds {
                 load,
                 build,
@@ -143,152 +177,134 @@ impl Job<'_> {
                 write,
                 total: clock.total(),
             },
-            rays: Rays::from(&picture.stats),
-            mrays_per_second: picture.stats.rays.total() as f64 / render.max(1e-9) / 1e6,
-            dropped_samples: picture.stats.dropped_samples,
+            rays: (&outcome.rays).into(),
+            mrays_per_second: outcome.rays.total() as f64 / render.max(1e-9) / 1e6,
+            dropped_samples: frame.dropped(),
             memory: Memory::of(&loaded, &world, engine.tracer()),
         };
         if let Some(path) = self.stats {
             stats.write(path)?;
         }
-        if !self.quiet {
-            stats.summarise()?;
+        match interrupt.signal().filter(|_| info.partial) {
+            Some(signal) => Err(CliError::Interrupted {
+                signal,
+                path: self.target.path().to_owned(),
+                resumable: self.target.keeps_all(),
+            }),
+            None => self.say(&stats.summary()),
         }
-        Ok(())
     }
 
-    fn render(&self, loaded: &Loaded, world: &World, engine: &dyn Engine) -> Picture {
+    /// The frame to be rendered, new or as it was left; `None` if there is nothing left to do.
+    fn begin(&self, scene: &mut Scene) -> Result<Option<FrameFile>, CliError> {
+        if !self.target.keeps_all() {
+            // Nobody would see them.
+            scene.film.aovs = AovSet::NONE;
+        }
+        let film = &scene.film;
+        let samples = self.samples(film)?;
+        let source = Source {
+            name: self.scene.display().to_string(),
+            hash: scene.fingerprint(),
+            integrator: scene.integrator.name().into(),
+            backend: String::new(), // not built yet
+        };
+        let objects = Objects::new(scene.objects.iter().map(|object| &object.name[..]));
+        let new = FrameFile {
+            info: FrameInfo::new(film, samples.clone(), &source),
+            frame: Frame::new(film, samples, objects.clone()),
+        };
+        if !self.resume {
+            return Ok(Some(new));
+        }
+        if !self.target.keeps_all() {
+            return Err(CliError::Usage(
+                "only EXR files can be gone on with: expected -o NAME.exr with --resume".into(),
+            ));
+        }
+        let path = self.target.path();
+        if !path.exists() {
+            return Ok(Some(new));
+        }
+        let mut old = FrameFile::read(path)?;
+        old.check_resumes(path, &new, self.scene)?;
+        old.frame.go_on_with(film, objects);
+        Ok(old.info.partial.then_some(old))
+    }
+
+    /// The numbers of the samples that are asked for.
+    fn samples(&self, film: &Film) -> Result<Range<u32>, CliError> {
+        let whole = 0..film.spp;
+        let Some(samples) = self.samples.clone() else {
+            return Ok(whole);
+        };
+        let Range { start, end } = samples;
+        if end > film.spp {
+            return Err(CliError::Usage(format!(
+                "--samples {start}..{end}: found {end}; expected at most the {} samples of a pixel (--spp)",
+                film.spp
+            )));
+        }
+        if film.adaptive.is_some() && samples != whole {
+            return Err(CliError::Usage(format!(
+                "--samples {start}..{end}: where adaptive sampling ends a pixel is seen from all its samples; \
+                 expected --adaptive-threshold off, or tiles (--crop) instead"
+            )));
+        }
+        Ok(samples)
+    }
+
+    fn render(
+        &self,
+        loaded: &Loaded,
+        world: &World,
+        engine: &dyn Engine,
+        begun: &mut FrameFile,
+        interrupt: &Interrupt,
+    ) -> Result<Outcome, CliError> {
         let scene = &loaded.scene;
         let object_materials: Vec<usize> = scene.objects.iter().map(|o| o.material).collect();
+        let input = RenderInput {
+            tracer: engine.tracer(),
+            surfaces: world,
+            camera: &scene.camera,
+            film: &scene.film,
+            materials: &scene.materials,
+            object_materials: &object_materials,
+            lights: &scene.lights,
+            integrator: &scene.integrator,
+        };
+        if !scene.camera.allow_inside
+            && let Some(object) = crate::render::enclosing_object(&input)
+            && let Some(error) = loaded.camera_inside(object)
+        {
+            return Err(error.into());
+        }
         let progress = Progress::new(self.quiet);
-        let picture = crate::render::render(
-            &RenderInput {
-                tracer: engine.tracer(),
-                surfaces: world,
-                camera: &scene.camera,
-                film: &scene.film,
-                materials: &scene.materials,
-                object_materials: &object_materials,
-                lights: &scene.lights,
-            },
-            &|done, total| progress.report(done, total),
-        );
+        let broken = AtomicBool::new(false);
+        let mut error = None;
+        let FrameFile { frame, info } = begun;
+        let mut show = |frame: &Frame| {
+            if let Err(failed) = self.target.write(frame, info, &scene.film) {
+                broken.store(true, Ordering::Relaxed);
+                error = Some(failed);
+            }
+        };
+        let control = Control {
+            progress: &|done, total| progress.report(done, total),
+            stop: &|| interrupt.signal().is_some() || broken.load(Ordering::Relaxed),
+            pass: Some(&mut show),
+            tile: None,
+        };
+        let outcome = crate::render::render_frame(&input, frame, control);
         progress.finish();
-        picture
+        error.map_or(Ok(outcome), Err)
     }
-}
 
-impl FilmArgs {
-    fn apply(&self, film: &mut Film) {
-        if let Some(Size { width, height }) = self.size {
-            (film.width, film.height) = (width, height);
+    fn say(&self, line: &str) -> Result<(), CliError> {
+        if self.quiet {
+            return Ok(());
         }
-        film.spp = self.spp.unwrap_or(film.spp);
-        film.seed = self.seed.unwrap_or(film.seed);
-    }
-}
-
-/// What `--stats` writes.
-#[derive(Serialize)]
-struct Stats {
-    version: &'static str,
-    scene: String,
-    picture: String,
-    backend: String,
-    simd: &'static str,
-    threads: usize,
-    width: u32,
-    height: u32,
-    spp: u32,
-    seed: u32,
-    seconds: Seconds,
-    rays: Rays,
-    /// All rays over the time of rendering.
-    mrays_per_second: f64,
-    dropped_samples: u64,
-    memory: Memory,
-}
-
-/// Wall-clock time by phase.
-#[derive(Serialize)]
-struct Seconds {
-    load: f64,
-    build: f64,
-    render: f64,
-    write: f64,
-    total: f64,
-}
-
-#[derive(Serialize)]
-struct Rays {
-    camera: u64,
-    shadow: u64,
-    reflection: u64,
-    total: u64,
-}
-
-impl From<&RenderStats> for Rays {
-    fn from(stats: &RenderStats) -> Self {
-        let rays = &stats.rays;
-        Self {
-            camera: rays.camera,
-            shadow: rays.shadow,
-            reflection: rays.reflection,
-            total: rays.total(),
-        }
-    }
-}
-
-impl Stats {
-    fn write(&self, path: &Path) -> Result<(), OutputError> {
-        atomic::write(path, |file| {
-            serde_json::to_writer_pretty(&mut *file, self)?;
-            writeln!(file)
-        })
-    }
-
-    fn summarise(&self) -> Result<(), CliError> {
-        let Self {
-            picture,
-            width,
-            height,
-            spp,
-            mrays_per_second,
-            ..
-        } = self;
-        let seconds = self.seconds.total;
-        writeln!(
-            std::io::stdout(),
-            "{picture}: {width}x{height}, {spp} spp, {seconds:.2} s, {mrays_per_second:.2} Mrays/s"
-        )
-        .map_err(CliError::stdout)
-    }
-}
-
-/// Measures phases one after the other.
-struct Clock {
-    start: Instant,
-    lap: Instant,
-}
-
-impl Clock {
-    fn start() -> Self {
-        let now = Instant::now();
-        Self {
-            start: now,
-            lap: now,
-        }
-    }
-
-    /// Seconds since the last lap.
-    fn lap(&mut self) -> f64 {
-        let now = Instant::now();
-        let seconds = (now - self.lap).as_secs_f64();
-        self.lap = now;
-        seconds
-    }
-
-    fn total(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
+        writeln!(std::io::stdout(), "{line}").map_err(CliError::stdout)
     }
 }

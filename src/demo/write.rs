@@ -50,7 +50,7 @@ impl Demo {
         write_png_gray16(&file("_height.png"), size, size, &files.heights)?;
         if !files.colors.is_empty() {
             let size = files.color_size;
-            write_png_rgb8(&file("_color.png"), size, size, &files.colors)?;
+            write_png_rgb8(&file("_color.png"), size, size, &files.colors, &[])?;
         }
         if files.scene.contains("floor.obj") {
             write_obj(&folder.join("floor.obj"), &floor())?;

@@ -1,5 +1,6 @@
 //! Colour pictures: textures for materials.
 
+use std::fmt;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
@@ -8,7 +9,7 @@ use super::channel::{self, Channel};
 use super::exr_file::ExrFile;
 use super::raster::{self, Raster, Samples};
 use super::srgb::{self, srgb_decode};
-use super::{Format, ImageError, format};
+use super::{Format, ImageError, fingerprint, format};
 use crate::surface::Wrap;
 
 /// What the numbers of an integer picture mean. Float pictures are linear whatever is said.
@@ -23,7 +24,7 @@ pub enum ColorSpace {
 }
 
 /// A colour picture, bottom row first. Alpha is dropped; a grey picture has its grey in all three channels.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct ColorImage {
     /// Pixels across.
     pub width: usize,
@@ -40,6 +41,22 @@ pub enum ColorPixels {
     Srgb8(Vec<[u8; 3]>),
     /// Linear RGB, finite.
     Linear(Vec<[f32; 3]>),
+}
+
+/// Size and fingerprint, not every pixel.
+impl fmt::Debug for ColorImage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kind, bytes): (_, &[u8]) = match &self.pixels {
+            ColorPixels::Srgb8(pixels) => ("sRGB", pixels.as_flattened()),
+            ColorPixels::Linear(pixels) => ("linear", bytemuck::cast_slice(pixels)),
+        };
+        let (width, height) = (self.width, self.height);
+        write!(
+            f,
+            "ColorImage({width}x{height} {kind} {})",
+            fingerprint(bytes)
+        )
+    }
 }
 
 impl ColorImage {

@@ -1,14 +1,15 @@
 //! Light from all around: equirectangular HDR pictures.
 
+use std::fmt;
 use std::path::Path;
 
 use glam::Vec3;
 
 use super::color::{ColorPixels, ColorSpace, load_color};
-use super::{Format, ImageError, format};
+use super::{Format, ImageError, fingerprint, format};
 
 /// An equirectangular HDR picture: top row first, the top row is +Y, the middle column looks along -Z.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct EnvironmentImage {
     /// Pixels across.
     pub width: usize,
@@ -16,6 +17,15 @@ pub struct EnvironmentImage {
     pub height: usize,
     /// Linear RGB radiance, finite, non-negative.
     pub pixels: Vec<Vec3>,
+}
+
+/// Size and fingerprint, not every pixel.
+impl fmt::Debug for EnvironmentImage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (width, height) = (self.width, self.height);
+        let pixels = fingerprint(bytemuck::cast_slice(&self.pixels));
+        write!(f, "EnvironmentImage({width}x{height} {pixels})")
+    }
 }
 
 /// Reads an OpenEXR or Radiance HDR picture.

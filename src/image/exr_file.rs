@@ -9,11 +9,12 @@ use std::path::{Path, PathBuf};
 use exr::block::reader::{ChunksReader, Reader};
 use exr::block::{self, UncompressedBlock};
 use exr::math::Vec2;
-use exr::meta::attribute::SampleType;
+use exr::meta::attribute::{AttributeValue, ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use exr::prelude::f16;
 
 use super::error::check_size;
+use super::exr_picture::{ExrChannel, ExrPicture, ExrSamples};
 use super::{Format, ImageError};
 
 /// An EXR file whose header was read and found acceptable.
@@ -71,18 +72,83 @@ impl ExrFile {
         let places: Vec<(usize, usize)> = wanted.iter().map(|&index| self.places[index]).collect();
         let layer = places[0].0;
         let header = self.reader.headers()[layer].clone();
+        self.check_layout(&header)?;
         for (&(its_layer, channel), &index) in places.iter().zip(wanted) {
-            self.check_channel(&header, channel, &self.channels[index])?;
+            if header.channels.list[channel].sample_type == SampleType::U32 {
+                let name = &self.channels[index];
+                return Err(self.unsupported(format!("32-bit integers in channel {name}")));
+            }
             if its_layer != layer {
                 return Err(self.unsupported("colour channels in different layers".to_owned()));
             }
         }
+        let channels = places.iter().map(|&(_, channel)| channel).collect();
+        let planes = self.planes(layer, &header, channels)?;
+        let floats = |plane| match plane {
+            ExrSamples::F32(samples) => samples,
+            ExrSamples::U32(samples) => samples.into_iter().map(|x| x as f32).collect(),
+        };
+        Ok(Planes {
+            width: header.layer_size.width(),
+            height: header.layer_size.height(),
+            planes: planes.into_iter().map(floats).collect(),
+        })
+    }
+
+    /// What the first layer is, without its channels.
+    pub fn describe(&self) -> ExrPicture {
+        let header = &self.reader.headers()[0];
+        let attributes = header.own_attributes.other.iter();
+        let attributes = attributes.filter_map(|(name, value)| match value {
+            AttributeValue::Text(value) => Some((name.to_string(), value.to_string())),
+            _ => None,
+        });
+        let Vec2(x, y) = header.own_attributes.layer_position;
+        let display = header.shared_attributes.display_window;
+        ExrPicture {
+            display: (display.size.width(), display.size.height()),
+            position: (x, y),
+            width: header.layer_size.width(),
+            height: header.layer_size.height(),
+            channels: Vec::new(),
+            attributes: attributes.collect(),
+        }
+    }
+
+    /// All channels of the first layer, and its texts.
+    pub fn read_all(self) -> Result<ExrPicture, ImageError> {
+        let mut picture = self.describe();
+        let header = self.reader.headers()[0].clone();
+        self.check_layout(&header)?;
+        let channels = &header.channels.list;
+        self.check_length(picture.width * picture.height * channels.len())?;
+        let planes = self.planes(0, &header, (0..channels.len()).collect())?;
+        let channel = |(channel, samples): (&ChannelDescription, _)| ExrChannel {
+            name: channel.name.to_string(),
+            samples,
+        };
+        picture.channels = channels.iter().zip(planes).map(channel).collect();
+        Ok(picture)
+    }
+
+    /// These channels of a layer, in this order.
+    fn planes(
+        self,
+        layer: usize,
+        header: &Header,
+        channels: Vec<usize>,
+    ) -> Result<Vec<ExrSamples>, ImageError> {
         let (width, height) = (header.layer_size.width(), header.layer_size.height());
+        let wanted = channels.len();
+        let plane = |&channel: &usize| match header.channels.list[channel].sample_type {
+            SampleType::U32 => ExrSamples::U32(vec![0; width * height]),
+            SampleType::F16 | SampleType::F32 => ExrSamples::F32(vec![0.0; width * height]),
+        };
         let mut canvas = Canvas {
             width,
             height,
-            channels: places.iter().map(|&(_, channel)| channel).collect(),
-            planes: vec![vec![0.0; width * height]; wanted.len()],
+            planes: channels.iter().map(plane).collect(),
+            channels,
             filled: 0,
         };
         let failed = |error| ImageError::decode(&self.path, Format::Exr, error);
@@ -92,25 +158,33 @@ impl ExrFile {
             })
             .map_err(failed)?
             // In this thread: a decoder that panics in a worker of its own takes the whole program down.
-            .decompress_sequential(false, |_, block| canvas.put(&header, &block))
+            .decompress_sequential(false, |_, block| canvas.put(header, &block))
             .map_err(failed)?;
-        if canvas.filled != width * height * wanted.len() {
+        if canvas.filled != width * height * wanted {
             return Err(ImageError::decode(
                 &self.path,
                 Format::Exr,
                 "blocks of pixels are missing",
             ));
         }
-        Ok(Planes {
-            width,
-            height,
-            planes: canvas.planes,
-        })
+        Ok(canvas.planes)
     }
 
-    fn check_channel(&self, header: &Header, channel: usize, name: &str) -> Result<(), ImageError> {
+    /// Refuses a file far too short for so many samples before memory is taken for them.
+    fn check_length(&self, samples: usize) -> Result<(), ImageError> {
+        /// Far more than any codec of EXR packs, of one colour too.
+        const MOST_SAMPLES_PER_BYTE: u64 = 1 << 16;
+        let bytes = std::fs::metadata(&self.path).map_or(u64::MAX, |file| file.len());
+        if samples as u64 / MOST_SAMPLES_PER_BYTE > bytes {
+            let reason = format!("{bytes} bytes cannot hold {samples} samples");
+            return Err(ImageError::decode(&self.path, Format::Exr, reason));
+        }
+        Ok(())
+    }
+
+    fn check_layout(&self, header: &Header) -> Result<(), ImageError> {
         if header.deep {
-            return Err(self.unsupported(format!("deep data in channel {name}")));
+            return Err(self.unsupported("deep data".to_owned()));
         }
         // Subsampling anywhere in the layer shifts every line behind it in a block.
         if let Some(odd) = header
@@ -121,10 +195,7 @@ impl ExrFile {
         {
             return Err(self.unsupported(format!("the subsampled channel {}", odd.name)));
         }
-        match header.channels.list[channel].sample_type {
-            SampleType::U32 => Err(self.unsupported(format!("32-bit integers in channel {name}"))),
-            SampleType::F16 | SampleType::F32 => Ok(()),
-        }
+        Ok(())
     }
 
     fn unsupported(&self, found: String) -> ImageError {
@@ -142,7 +213,7 @@ struct Canvas {
     height: usize,
     /// Index within the layer of each plane's channel.
     channels: Vec<usize>,
-    planes: Vec<Vec<f32>>,
+    planes: Vec<ExrSamples>,
     /// Samples put so far.
     filled: usize,
 }
@@ -165,11 +236,14 @@ impl Canvas {
                 ));
             }
             let start = (self.height - 1 - y) * self.width + x;
-            let row = &mut self.planes[plane][start..start + count];
-            match header.channels.list[line.location.channel].sample_type {
-                SampleType::F16 => widen(row, line.value, |b| f16::from_ne_bytes(b).to_f32()),
-                SampleType::F32 => widen(row, line.value, f32::from_ne_bytes),
-                SampleType::U32 => widen(row, line.value, |b| u32::from_ne_bytes(b) as f32),
+            let run = start..start + count;
+            let half = header.channels.list[line.location.channel].sample_type == SampleType::F16;
+            match &mut self.planes[plane] {
+                ExrSamples::F32(s) if half => {
+                    decode(&mut s[run], line.value, |b| f16::from_ne_bytes(b).to_f32());
+                }
+                ExrSamples::F32(s) => decode(&mut s[run], line.value, f32::from_ne_bytes),
+                ExrSamples::U32(s) => decode(&mut s[run], line.value, u32::from_ne_bytes),
             }
             self.filled += count;
         }
@@ -177,9 +251,30 @@ impl Canvas {
     }
 }
 
-fn widen<const N: usize>(row: &mut [f32], bytes: &[u8], sample: impl Fn([u8; N]) -> f32) {
+fn decode<const N: usize, T>(row: &mut [T], bytes: &[u8], sample: impl Fn([u8; N]) -> T) {
     let (samples, _) = bytes.as_chunks::<N>();
     for (out, &bytes) in row.iter_mut().zip(samples) {
         *out = sample(bytes);
+    }
+}
+
+/// Reads all channels of the first layer of the EXR file at `path`, and its text attributes.
+pub fn read_exr(path: &Path) -> Result<ExrPicture, ImageError> {
+    open(path)?.read_all()
+}
+
+/// As [`read_exr`], without the channels: a few bytes of the file.
+pub fn read_exr_header(path: &Path) -> Result<ExrPicture, ImageError> {
+    Ok(open(path)?.describe())
+}
+
+fn open(path: &Path) -> Result<ExrFile, ImageError> {
+    match super::format::open(path)? {
+        (Format::Exr, file) => ExrFile::open(path, file),
+        (other, _) => Err(ImageError::decode(
+            path,
+            Format::Exr,
+            format!("it is a {other} picture"),
+        )),
     }
 }

@@ -12,6 +12,7 @@ mod color;
 mod environment;
 mod error;
 mod exr_file;
+mod exr_picture;
 mod format;
 mod heights;
 mod raster;
@@ -24,13 +25,20 @@ pub use channel::Channel;
 pub use color::{ColorImage, ColorPixels, ColorSpace, load_color};
 pub use environment::{EnvironmentImage, load_environment};
 pub use error::ImageError;
+pub use exr_file::{read_exr, read_exr_header};
+pub use exr_picture::{ExrChannel, ExrPicture, ExrSamples};
 pub use format::Format;
 pub use heights::load_heights;
 pub use srgb::{srgb_decode, srgb_encode};
-pub use write::{ExrChannel, write_exr, write_png_gray16, write_png_rgb8};
+pub use write::{write_exr, write_exr_picture, write_png_gray16, write_png_rgb8};
 
 /// Most pixels of a picture that is read: 32768 x 16384.
 pub const MAX_PIXELS: u64 = 1 << 29;
+
+/// 32 hexadecimal digits for the bytes of a picture: XXH3, 128 bits. It tells pictures apart, not forgeries.
+pub(crate) fn fingerprint(bytes: &[u8]) -> String {
+    format!("{:032x}", twox_hash::XxHash3_128::oneshot(bytes))
+}
 
 #[cfg(test)]
 mod test_files;

@@ -3,31 +3,33 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use exr::meta::attribute::AttributeValue;
+use exr::math::Vec2;
+use exr::meta::attribute::{AttributeValue, IntegerBounds};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text,
-    WritableImage,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, Layer, LayerAttributes,
+    Text, WritableImage,
 };
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
 
 use super::atomic::{self, OutputError};
+use super::exr_picture::{ExrChannel, ExrPicture, ExrSamples};
 
-/// Writes an 8-bit RGB PNG, `pixels` sRGB-encoded, bottom row first.
+/// Writes an 8-bit RGB PNG, `pixels` sRGB-encoded, bottom row first, with `texts` (keyword, text) in it.
 pub fn write_png_rgb8(
     path: &Path,
     width: usize,
     height: usize,
     pixels: &[[u8; 3]],
+    texts: &[(String, String)],
 ) -> Result<(), OutputError> {
     let pixels = top_first(path, width, height, pixels)?;
-    write_png(
-        path,
-        width,
-        height,
-        pixels.as_flattened(),
-        ExtendedColorType::Rgb8,
-    )
+    write_png(path, width, height, pixels.as_flattened(), |info| {
+        info.set_color(png::ColorType::Rgb);
+        info.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        for (keyword, text) in texts {
+            info.add_text_chunk(keyword.clone(), text.clone())?;
+        }
+        Ok(())
+    })
 }
 
 /// Writes a 16-bit grey PNG, bottom row first. Fast rather than small.
@@ -38,8 +40,12 @@ pub fn write_png_gray16(
     heights: &[u16],
 ) -> Result<(), OutputError> {
     let heights = top_first(path, width, height, heights)?;
-    let bytes = bytemuck::cast_slice(&heights);
-    write_png(path, width, height, bytes, ExtendedColorType::L16)
+    let bytes: Vec<u8> = heights.iter().flat_map(|h| h.to_be_bytes()).collect();
+    write_png(path, width, height, &bytes, |info| {
+        info.set_color(png::ColorType::Grayscale);
+        info.set_depth(png::BitDepth::Sixteen);
+        Ok(())
+    })
 }
 
 fn write_png(
@@ -47,43 +53,29 @@ fn write_png(
     width: usize,
     height: usize,
     bytes: &[u8],
-    color: ExtendedColorType,
+    describe: impl FnOnce(
+        &mut png::Encoder<&mut io::BufWriter<&std::fs::File>>,
+    ) -> Result<(), png::EncodingError>,
 ) -> Result<(), OutputError> {
     // A side beyond 32 bits holds more pixels than memory does; the encoder refuses what is beyond PNG's 31.
     let (width, height) = (width as u32, height as u32);
     atomic::write(path, |file| {
-        PngEncoder::new_with_quality(file, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(bytes, width, height, color)
-            .map_err(|error| match error {
-                image::ImageError::IoError(source) => source,
-                other => io::Error::other(other),
-            })
+        let mut encoder = png::Encoder::new(file, width, height);
+        encoder.set_compression(png::Compression::Fast);
+        let written = describe(&mut encoder).and_then(|()| {
+            let mut writer = encoder.write_header()?;
+            writer.write_image_data(bytes)?;
+            writer.finish()
+        });
+        written.map_err(|error| match error {
+            png::EncodingError::IoError(source) => source,
+            other => io::Error::other(other),
+        })
     })
 }
 
-/// One channel of an EXR file.
-#[derive(Clone, Debug)]
-pub struct ExrChannel {
-    /// `R`, `G`, `B`, `A`, or `layer.channel`, as OpenEXR names the channels of layers.
-    pub name: String,
-    /// Samples, bottom row first.
-    pub samples: Vec<f32>,
-}
-
-impl ExrChannel {
-    /// The channels of an RGB picture; with a layer's name, those of that layer.
-    pub fn rgb(layer: Option<&str>, pixels: &[[f32; 3]]) -> [Self; 3] {
-        [("R", 0), ("G", 1), ("B", 2)].map(|(channel, index)| Self {
-            name: match layer {
-                Some(layer) => format!("{layer}.{channel}"),
-                None => channel.to_owned(),
-            },
-            samples: pixels.iter().map(|pixel| pixel[index]).collect(),
-        })
-    }
-}
-
-/// Writes an EXR file of 32-bit float channels, compressed without loss, with text `attributes` (name, value).
+/// Writes an EXR file of 32-bit float channels over the whole picture, compressed without loss, with text `attributes`
+/// (name, value).
 ///
 /// Samples are written as they are: linear light, NaN and infinity included. An empty list of channels, two of the same name or
 /// an unusable attribute is [`OutputError::Failed`].
@@ -94,17 +86,39 @@ pub fn write_exr(
     channels: Vec<ExrChannel>,
     attributes: &[(&str, &str)],
 ) -> Result<(), OutputError> {
-    let mut list = Vec::with_capacity(channels.len());
-    for channel in channels {
-        let samples = top_first(path, width, height, &channel.samples)?;
-        let name = text(path, &channel.name)?;
-        list.push(AnyChannel::new(name, FlatSamples::F32(samples)));
+    let attributes = attributes
+        .iter()
+        .map(|&(name, value)| (name.into(), value.into()));
+    let picture = ExrPicture {
+        display: (width, height),
+        position: (0, 0),
+        width,
+        height,
+        channels,
+        attributes: attributes.collect(),
+    };
+    write_exr_picture(path, picture)
+}
+
+/// Writes an EXR file of one layer, as [`write_exr`].
+pub fn write_exr_picture(path: &Path, picture: ExrPicture) -> Result<(), OutputError> {
+    let (width, height) = (picture.width, picture.height);
+    let mut list = Vec::with_capacity(picture.channels.len());
+    for channel in picture.channels {
+        let samples = match channel.samples {
+            ExrSamples::F32(s) => FlatSamples::F32(top_first(path, width, height, &s)?),
+            ExrSamples::U32(s) => FlatSamples::U32(top_first(path, width, height, &s)?),
+        };
+        list.push(AnyChannel::new(text(path, &channel.name)?, samples));
     }
-    let mut header = LayerAttributes::default();
-    for (name, value) in attributes {
-        header
-            .other
-            .insert(text(path, name)?, AttributeValue::Text(text(path, value)?));
+    let mut header = LayerAttributes {
+        layer_position: Vec2(picture.position.0, picture.position.1),
+        software_name: Some(Text::from(concat!("prismarch ", env!("CARGO_PKG_VERSION")))),
+        ..LayerAttributes::default()
+    };
+    for (name, value) in &picture.attributes {
+        let value = AttributeValue::Text(text(path, value)?);
+        header.other.insert(text(path, name)?, value);
     }
     let layer = Layer::new(
         (width, height),
@@ -112,16 +126,19 @@ pub fn write_exr(
         Encoding::SMALL_LOSSLESS,
         AnyChannels::sort(list.into()),
     );
-    let picture = Image::from_layer(layer);
-    atomic::write(path, |file| {
-        picture
-            .write()
-            .to_buffered(&mut *file)
+    let display = IntegerBounds::from_dimensions(picture.display);
+    let file = Image {
+        attributes: ImageAttributes::new(display),
+        layer_data: layer,
+    };
+    atomic::write(path, |out| {
+        file.write()
+            .to_buffered(&mut *out)
             .map_err(|error| match error {
                 exr::error::Error::Io(source) => source,
                 other => io::Error::other(other),
             })?;
-        file.flush()
+        out.flush()
     })
 }
 

@@ -273,6 +273,10 @@ impl Prisms {
         SurfacePoint {
             position: point.position.as_vec3(),
             base_position: patch.base(bu, bv).as_vec3(),
+            base_normal: patch
+                .normal(bu, bv)
+                .normalize_or(patch.face_normal())
+                .as_vec3(),
             geometric_normal: point
                 .du
                 .cross(point.dv)

@@ -9,53 +9,84 @@
 //! whatever the number of threads and the order of tiles. Radiance is linear RGB with Rec. 709 primaries.
 
 mod basis;
+mod bsdf;
 mod camera;
-mod film;
-mod filter;
-mod ggx;
+mod detail;
+pub mod film;
 mod integrator;
 mod light;
 mod material;
 mod sampler;
 mod shading;
-mod tone;
 
+use std::ops::Range;
 use std::sync::Mutex;
 
 use glam::Vec3;
 use rayon::prelude::*;
 
+pub use film::to_srgb8;
 pub use integrator::RayCounts;
-pub use tone::to_srgb8;
 
 use crate::ray::{Cone, Ray};
-use crate::scene::{Camera, Film, Light, Material};
+use crate::scene::{Camera, Film, Integrator, Light, Material};
 use crate::surface::SurfacePoint;
-use crate::trace::{Hit, Tracer, World};
-use camera::PinholeCamera;
-use film::{TileGrid, TileRenderer};
-use filter::PixelFilter;
-use integrator::Beauty;
+use crate::trace::{Hit, PlacedObject, Tracer, World};
+use film::{Frame, Objects, TileGrid, TileRenderer};
 
-/// Pixels along a tile's side: small enough that the last tiles keep all threads busy.
+/// Most pixels along a tile's side.
 const TILE: u32 = 32;
+/// Most samples of a tile: the last tiles keep all threads busy.
+const TILE_SAMPLES: u32 = TILE * TILE * 16;
 
 /// What the renderer asks of a hit.
 pub trait Surfaces: Sync {
-    /// The surface there in world space, as the cone around `ray` sees it, which made the hit.
-    fn point(&self, hit: &Hit, ray: &Ray, cone: &Cone) -> SurfacePoint;
+    /// The surface there, in world space.
+    fn point(&self, hit: &Hit) -> SurfacePoint;
+
+    /// The same as the cone around `ray` sees it, which made the hit.
+    fn seen_point(&self, hit: &Hit, ray: &Ray, cone: &Cone) -> SurfacePoint {
+        let _ = (ray, cone);
+        self.point(hit)
+    }
 
     /// Index of the object that was hit.
     fn object(&self, hit: &Hit) -> usize;
+
+    /// Every object once per place where it stands, by rising top-level ids: where light may come from.
+    fn placed(&self) -> Vec<PlacedObject>;
+
+    /// |dS/du x dS/dv| there, square world units; `None` where (u, v) are no barycentric coordinates.
+    fn area_element(&self, hit: &Hit) -> Option<f32>;
+
+    /// dP/ds and dP/dt of the undisplaced surface along its texture coordinates, world space; `None` where it has
+    /// none.
+    fn tangents(&self, hit: &Hit) -> Option<[Vec3; 2]>;
 }
 
 impl Surfaces for World {
-    fn point(&self, hit: &Hit, ray: &Ray, cone: &Cone) -> SurfacePoint {
-        self.seen_point(hit, ray, cone)
+    fn point(&self, hit: &Hit) -> SurfacePoint {
+        self.surface_point(hit)
+    }
+
+    fn seen_point(&self, hit: &Hit, ray: &Ray, cone: &Cone) -> SurfacePoint {
+        World::seen_point(self, hit, ray, cone)
     }
 
     fn object(&self, hit: &Hit) -> usize {
         self.resolve(hit).object
+    }
+
+    fn placed(&self) -> Vec<PlacedObject> {
+        World::placed(self)
+    }
+
+    fn area_element(&self, hit: &Hit) -> Option<f32> {
+        World::area_element(self, hit)
+    }
+
+    fn tangents(&self, hit: &Hit) -> Option<[Vec3; 2]> {
+        World::tangents(self, hit)
     }
 }
 
@@ -68,14 +99,22 @@ pub struct RenderInput<'a> {
     pub surfaces: &'a dyn Surfaces,
     /// From where.
     pub camera: &'a Camera,
-    /// At which size and quality; neither width, height nor samples are 0.
+    /// At which size and quality; neither width, height nor samples are 0, and the crop window is inside.
     pub film: &'a Film,
     /// Materials.
     pub materials: &'a [Material],
     /// Per object of the world an index into `materials`.
     pub object_materials: &'a [usize],
-    /// Lights; none is a white world.
+    /// Lights; none at all, not even a shining surface, is a white world.
     pub lights: &'a [Light],
+    /// What is computed for a camera ray.
+    pub integrator: &'a Integrator,
+}
+
+/// The opaque object, if any, that the camera of `input` is inside of: its inner side is all that is seen in any
+/// direction.
+pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
+    integrator::enclosing_object(input)
 }
 
 /// A finished picture.
@@ -100,7 +139,7 @@ pub struct RenderStats {
     pub dropped_samples: u64,
 }
 
-/// Renders the first look: direct light and one reflection.
+/// Renders the film's crop window by the scene's integrator, all samples.
 ///
 /// Runs on the current rayon pool. `progress` is called with (tiles done, tiles in all), once per finished tile
 /// and in order, from any thread of the pool.
@@ -109,72 +148,141 @@ pub struct RenderStats {
 /// When an object's material index is out of range, or a hit names an object the world does not have: a
 /// loaded scene and its own tracer never do.
 pub fn render(input: &RenderInput, progress: &(dyn Fn(usize, usize) + Sync)) -> Picture {
-    render_tiled(input, TILE, progress)
-}
-
-fn render_tiled(
-    input: &RenderInput,
-    tile_size: u32,
-    progress: &(dyn Fn(usize, usize) + Sync),
-) -> Picture {
     let film = input.film;
-    let integrator = Beauty::new(input);
-    let renderer = TileRenderer {
-        camera: PinholeCamera::new(input.camera, film.width, film.height),
-        filter: PixelFilter::blackman_harris(),
-        integrator: &integrator,
-        film,
+    let mut frame = Frame::new(film, 0..film.spp, Objects::default());
+    let control = Control {
+        progress,
+        ..Control::default()
     };
-    let grid = TileGrid::new(film.width, film.height, tile_size);
-    let assembly = Mutex::new(Assembly::new(film));
-    (0..grid.len())
-        .into_par_iter()
-        .with_max_len(1)
-        .for_each(|index| {
-            let tile = grid.tile(index);
-            let result = renderer.render(tile);
-            // A poisoned lock means that another tile panicked: the panic is on its way to the caller.
-            if let Ok(mut assembly) = assembly.lock() {
-                assembly.place(tile, &result);
-                progress(assembly.done, grid.len());
-            }
-        });
-    assembly
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
-        .picture
+    let outcome = render_frame(input, &mut frame, control);
+    Picture::new(&frame, &outcome)
 }
 
-/// A picture while its tiles come in.
-struct Assembly {
-    picture: Picture,
-    done: usize,
-}
-
-impl Assembly {
-    fn new(film: &Film) -> Self {
+impl Picture {
+    fn new(frame: &Frame, outcome: &Outcome) -> Self {
+        let size = frame.window().size();
         Self {
-            picture: Picture {
-                width: film.width,
-                height: film.height,
-                pixels: vec![Vec3::ZERO; film.width as usize * film.height as usize],
-                stats: RenderStats::default(),
+            width: size.x,
+            height: size.y,
+            pixels: frame.radiance(),
+            stats: RenderStats {
+                rays: outcome.rays,
+                dropped_samples: frame.dropped(),
             },
-            done: 0,
         }
-    }
-
-    fn place(&mut self, tile: film::Tile, result: &film::TileResult) {
-        let columns = (tile.end.x - tile.start.x) as usize;
-        for (y, row) in (tile.start.y..).zip(result.pixels.chunks_exact(columns)) {
-            let start = y as usize * self.picture.width as usize + tile.start.x as usize;
-            self.picture.pixels[start..start + columns].copy_from_slice(row);
-        }
-        self.picture.stats.rays += result.rays;
-        self.picture.stats.dropped_samples += result.dropped;
-        self.done += 1;
     }
 }
 
+/// How a run is watched and stopped.
+pub struct Control<'a> {
+    /// Called with (tiles done, tiles in all), once per finished tile and in order, from any thread.
+    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+    /// Asked before every sample, from any thread; what is done stays when it says true.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+    /// Called between two passes.
+    pub pass: Option<&'a mut dyn FnMut(&Frame)>,
+    /// Pixels along a tile's side, instead of what keeps all threads busy; at least 1.
+    pub tile: Option<u32>,
+}
+
+impl Default for Control<'_> {
+    /// Neither watched nor stopped.
+    fn default() -> Self {
+        Self {
+            progress: &|_, _| (),
+            stop: &|| false,
+            pass: None,
+            tile: None,
+        }
+    }
+}
+
+/// What became of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outcome {
+    /// Rays traced.
+    pub rays: RayCounts,
+    /// Whether it was stopped before its end.
+    pub stopped: bool,
+}
+
+/// Gives the pixels of `frame` the samples that they still lack. The frame's bits depend neither on the threads nor on
+/// the tiles nor on stops between. Runs on the current rayon pool.
+///
+/// # Panics
+/// As [`render()`].
+pub fn render_frame(input: &RenderInput, frame: &mut Frame, mut control: Control) -> Outcome {
+    let integrator = integrator::prepare(input);
+    let renderer = TileRenderer::new(input.camera, input.film, &*integrator);
+    let passes = passes(frame.samples(), input.film.progressive);
+    let grids = passes.iter().map(|pass| {
+        let side = control.tile.unwrap_or_else(|| tile_side(pass.len() as u32));
+        TileGrid::new(frame.window(), side)
+    });
+    let grids: Vec<TileGrid> = grids.collect();
+    let total = grids.iter().map(TileGrid::len).sum();
+    let mut outcome = Outcome {
+        rays: RayCounts::default(),
+        stopped: false,
+    };
+    let mut before = 0;
+    for (pass, grid) in passes.iter().zip(&grids) {
+        let (progress, stop) = (control.progress, control.stop);
+        let assembly = Mutex::new((&mut *frame, &mut outcome, before));
+        (0..grid.len())
+            .into_par_iter()
+            .with_max_len(1)
+            .for_each(|index| {
+                // A poisoned lock means that another tile panicked: the panic is on its way to the caller.
+                let Ok(mut tile) = assembly.lock().map(|a| a.0.part(grid.tile(index))) else {
+                    return;
+                };
+                let result = renderer.render(&mut tile, pass.end, stop);
+                if let Ok(mut assembly) = assembly.lock() {
+                    let (frame, outcome, done) = &mut *assembly;
+                    frame.place(&tile);
+                    outcome.rays += result.rays;
+                    outcome.stopped |= result.stopped;
+                    if !result.stopped {
+                        *done += 1;
+                        progress(*done, total);
+                    }
+                }
+            });
+        if outcome.stopped {
+            break;
+        }
+        before += grid.len();
+        if let Some(pass) = control.pass.as_mut().filter(|_| before < total) {
+            pass(frame);
+        }
+    }
+    outcome
+}
+
+/// The runs of samples that are taken one after the other: all at once, or each as long as all before.
+fn passes(samples: &Range<u32>, progressive: bool) -> Vec<Range<u32>> {
+    let mut passes = Vec::new();
+    let mut start = samples.start;
+    while start < samples.end {
+        let done = start - samples.start;
+        let end = if progressive {
+            start.saturating_add(done.max(1))
+        } else {
+            samples.end
+        };
+        passes.push(start..end.min(samples.end));
+        start = end;
+    }
+    passes
+}
+
+/// Pixels along the side of tiles that take so many samples per pixel.
+fn tile_side(spp: u32) -> u32 {
+    (TILE_SAMPLES / spp.max(1)).isqrt().clamp(1, TILE)
+}
+
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;

@@ -17,8 +17,16 @@ use glam::{UVec2, Vec2};
 pub enum Purpose {
     /// Where on the pixel's filter the camera ray starts.
     Film,
-    /// Direction of the reflection ray.
-    Reflection,
+    /// Direction of the next ray.
+    Bounce,
+    /// Which lobe of the material it is drawn from, and whether the path ends instead.
+    Lobe,
+    /// Which light is sampled.
+    LightChoice,
+    /// Whether a ray slips through a hole.
+    Opacity,
+    /// Where on the lens the camera ray starts.
+    Lens,
     /// Point on the light of this index.
     Light(u32),
 }
@@ -41,7 +49,11 @@ impl Dimension {
     fn hash(self) -> u32 {
         let purpose = match self.purpose {
             Purpose::Film => 0,
-            Purpose::Reflection => 1,
+            Purpose::Bounce => 1,
+            Purpose::Lobe => u32::MAX,
+            Purpose::LightChoice => u32::MAX - 1,
+            Purpose::Opacity => u32::MAX - 2,
+            Purpose::Lens => u32::MAX - 3,
             Purpose::Light(index) => index.wrapping_add(2),
         };
         hash(hash(self.depth) ^ purpose)
@@ -173,7 +185,7 @@ mod tests {
         };
         let base = at(5, 0, Purpose::Film, 1);
         let others = [
-            at(5, 0, Purpose::Reflection, 1),
+            at(5, 0, Purpose::Bounce, 1),
             at(5, 0, Purpose::Light(0), 1),
             at(5, 0, Purpose::Light(1), 1),
             at(5, 1, Purpose::Film, 1),

@@ -1,13 +1,14 @@
 //! A surface point made ready for shading: sides, normals, material.
 //!
 //! Two normals meet here. The geometric normal says on which side of the surface a direction is: light from
-//! behind it never passes, whatever the shading normal says. The shading normal says how bright it is. Both are
-//! turned to the viewer, so surfaces are two-sided.
+//! behind it never passes an opaque surface, whatever the shading normal says. The shading normal says how bright it
+//! is. Both are turned to the viewer, so surfaces are two-sided.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::basis::Basis;
-use super::material::{Bsdf, Scattering, SpecularSample};
+use super::bsdf::{Allowed, Bounce, Bsdf, Parameters, Scattering};
+use super::light::Receiver;
 use crate::surface::SurfacePoint;
 
 /// A surface point seen from some direction.
@@ -17,35 +18,50 @@ pub struct ShadedPoint {
     pub position: Vec3,
     /// Unit geometric normal on the viewer's side.
     pub geometric_normal: Vec3,
-    /// See [`SurfacePoint::tolerance`].
-    pub tolerance: f32,
     basis: Basis,
     /// Cosine between both normals.
     alignment: f32,
-    /// To the viewer, in `basis`.
-    to_viewer: Vec3,
     bsdf: Bsdf,
 }
 
+/// A direction to go on in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Continuation {
+    /// Unit vector, world space.
+    pub direction: Vec3,
+    /// BSDF times cosine over density.
+    pub weight: Vec3,
+    /// Density per steradian; `None` for the only direction of a smooth interface.
+    pub pdf: Option<f32>,
+    /// What kind of bounce.
+    pub bounce: Bounce,
+}
+
 impl ShadedPoint {
-    /// `point` seen from the unit direction `to_viewer`.
-    pub fn new(point: &SurfacePoint, to_viewer: Vec3, bsdf: Bsdf) -> Self {
-        let side = if point.geometric_normal.dot(to_viewer) < 0.0 {
-            -1.0
-        } else {
+    /// `point` seen from the unit direction `to_viewer`, with the shading normal `normal` on its outer side.
+    pub fn new(
+        point: &SurfacePoint,
+        normal: Vec3,
+        to_viewer: Vec3,
+        parameters: Parameters,
+    ) -> Self {
+        let side = if is_outside(point, to_viewer) {
             1.0
+        } else {
+            -1.0
         };
         let geometric = side * point.geometric_normal;
-        let shading = facing(side * point.shading_normal, geometric, to_viewer);
+        let shading = facing(side * normal, geometric, to_viewer);
         let basis = Basis::around(shading);
+        let mut local = basis.to_local(to_viewer);
+        // A viewer in the surface's plane is taken to be just above it.
+        local.z = local.z.max(1e-4);
         Self {
             position: point.position,
             geometric_normal: geometric,
-            tolerance: point.tolerance,
             basis,
             alignment: shading.dot(geometric),
-            to_viewer: basis.to_local(to_viewer),
-            bsdf,
+            bsdf: Bsdf::new(parameters, local.normalize()),
         }
     }
 
@@ -54,32 +70,64 @@ impl ShadedPoint {
         self.basis.z
     }
 
-    /// Whether a reflection ray could change the picture.
-    pub fn reflects(&self) -> bool {
-        self.to_viewer.z > 0.0 && self.bsdf.reflects(self.to_viewer)
+    /// The point as lights see it.
+    pub fn receiver(&self) -> Receiver {
+        Receiver {
+            position: self.position,
+            normal: self.basis.z,
+        }
+    }
+
+    /// The material there.
+    pub fn bsdf(&self) -> &Bsdf {
+        &self.bsdf
     }
 
     /// What is scattered to the viewer of light from the unit vector `to_light`; `None` for nothing.
-    pub fn scattering(&self, to_light: Vec3) -> Option<Scattering> {
+    pub fn scattering(&self, to_light: Vec3, allowed: Allowed) -> Option<Scattering> {
         let above = self.geometric_normal.dot(to_light);
         let local = self.basis.to_local(to_light);
-        if above <= 0.0 || local.z <= 0.0 {
+        // A direction that both normals do not see on the same side is one the surface hides.
+        if above * local.z <= 0.0 {
             return None;
         }
-        let mut scattering = self.bsdf.evaluate(self.to_viewer, local);
-        scattering.diffuse *= terminator(above, local.z, self.alignment);
+        let mut scattering = self.bsdf.evaluate(local, allowed);
+        if above > 0.0 {
+            scattering.diffuse *= terminator(above, local.z, self.alignment);
+        }
         Some(scattering)
     }
 
-    /// A direction of the specular lobe, in world space; `None` where it would go below the surface.
-    pub fn sample_specular(&self, u: glam::Vec2) -> Option<SpecularSample> {
-        let sample = self.bsdf.sample_specular(self.to_viewer, u)?;
+    /// A direction by the kinds of bounces that are `allowed`; `choice` and `u` are uniform in [0, 1). `None` where it
+    /// would go nowhere.
+    pub fn sample(&self, choice: f32, u: Vec2, allowed: Allowed) -> Option<Continuation> {
+        let sample = self.bsdf.sample(choice, u, allowed)?;
         let direction = self.basis.to_world(sample.direction);
-        (self.geometric_normal.dot(direction) > 0.0).then_some(SpecularSample {
+        if self.geometric_normal.dot(direction) * sample.direction.z <= 0.0 {
+            return None;
+        }
+        let (weight, pdf) = match sample.mirror_weight {
+            Some(weight) => (weight, None),
+            None => {
+                let found = self.scattering(direction, allowed)?;
+                if found.pdf <= 0.0 {
+                    return None;
+                }
+                (found.part(allowed) / found.pdf, Some(found.pdf))
+            }
+        };
+        Some(Continuation {
             direction,
-            ..sample
+            weight,
+            pdf,
+            bounce: sample.bounce,
         })
     }
+}
+
+/// Whether the unit direction `to_viewer` leaves `point` on the outer side.
+pub fn is_outside(point: &SurfacePoint, to_viewer: Vec3) -> bool {
+    point.geometric_normal.dot(to_viewer) >= 0.0
 }
 
 /// The shading normal, bent as little as needed for the viewer's mirror direction to be above the surface, so
@@ -111,15 +159,15 @@ fn terminator(above_geometric: f32, above_shading: f32, alignment: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec2;
-
     use super::*;
-    use crate::scene::{Color, Material};
+    use crate::render::material;
+    use crate::scene::{Color, Material, Scalar};
 
     fn point(geometric: Vec3, shading: Vec3) -> SurfacePoint {
         SurfacePoint {
             position: Vec3::ZERO,
             base_position: Vec3::ZERO,
+            base_normal: geometric,
             geometric_normal: geometric,
             shading_normal: shading.normalize(),
             texcoord: Vec2::ZERO,
@@ -128,15 +176,14 @@ mod tests {
         }
     }
 
-    fn white() -> Bsdf {
+    fn seen(point: SurfacePoint, to_viewer: Vec3) -> ShadedPoint {
         let material = Material {
-            name: "white".into(),
             base_color: Color::Constant(Vec3::ONE),
-            metallic: 0.0,
-            roughness: 0.3,
-            specular: 0.5,
+            roughness: Scalar::Constant(0.3),
+            ..Material::default()
         };
-        Bsdf::new(&material, Vec2::ZERO)
+        let white = material::parameters(&material, &point, 1.5, false);
+        ShadedPoint::new(&point, point.shading_normal, to_viewer, white)
     }
 
     #[test]
@@ -144,19 +191,20 @@ mod tests {
         let shading = Vec3::new(0.2, 1.0, 0.1);
         let v = Vec3::new(0.3, 0.8, -0.2).normalize();
         let l = Vec3::new(-0.5, 0.6, 0.3).normalize();
-        let front = ShadedPoint::new(&point(Vec3::Y, shading), v, white());
-        let back = ShadedPoint::new(&point(Vec3::NEG_Y, -shading), v, white());
-        assert_eq!(front.scattering(l), back.scattering(l));
-        assert!(front.scattering(l).unwrap().diffuse.x > 0.0);
+        let front = seen(point(Vec3::Y, shading), v);
+        let back = seen(point(Vec3::NEG_Y, -shading), v);
+        let [front, back] = [front, back].map(|p| p.scattering(l, Allowed::ALL));
+        assert_eq!(front, back);
+        assert!(front.unwrap().diffuse.x > 0.0);
     }
 
     #[test]
     fn light_from_behind_the_surface_never_passes() {
         // The shading normal sees a light that the surface itself hides.
-        let p = ShadedPoint::new(&point(Vec3::Y, Vec3::new(1.0, 1.0, 0.0)), Vec3::Y, white());
+        let p = seen(point(Vec3::Y, Vec3::new(1.0, 1.0, 0.0)), Vec3::Y);
         let behind = Vec3::new(1.0, -0.1, 0.0).normalize();
         assert!(p.shading_normal().dot(behind) > 0.0);
-        assert_eq!(p.scattering(behind), None);
+        assert_eq!(p.scattering(behind, Allowed::ALL), None);
     }
 
     #[test]

@@ -1,12 +1,14 @@
 //! Whole pictures of shapes whose answers are known.
 
+mod film;
+
 use std::sync::Mutex;
 
 use glam::{Vec2, Vec3};
 
 use super::*;
 use crate::ray::{Aabb, Ray};
-use crate::scene::{Color, ToneCurve};
+use crate::scene::{Color, PathLimits, Scalar};
 use crate::trace::INVALID_ID;
 
 /// The plane y = 0 (object 0) and perhaps a unit sphere at height 1 (object 1). A hit carries its point and normal.
@@ -81,11 +83,12 @@ impl Tracer for Shapes {
 }
 
 impl Surfaces for Shapes {
-    fn point(&self, hit: &Hit, _: &Ray, _: &Cone) -> SurfacePoint {
+    fn point(&self, hit: &Hit) -> SurfacePoint {
         let position = Vec3::new(hit.u, f32::from_bits(hit.prim), hit.v);
         SurfacePoint {
             position,
             base_position: position,
+            base_normal: hit.ng.normalize(),
             geometric_normal: hit.ng.normalize(),
             shading_normal: hit.ng.normalize(),
             texcoord: Vec2::ZERO,
@@ -97,15 +100,28 @@ impl Surfaces for Shapes {
     fn object(&self, hit: &Hit) -> usize {
         hit.geom as usize
     }
+
+    fn placed(&self) -> Vec<PlacedObject> {
+        Vec::new()
+    }
+
+    fn area_element(&self, _: &Hit) -> Option<f32> {
+        None
+    }
+
+    fn tangents(&self, _: &Hit) -> Option<[Vec3; 2]> {
+        None
+    }
 }
 
 fn material(metallic: f32, roughness: f32, specular: f32) -> Material {
     Material {
         name: "white".into(),
         base_color: Color::Constant(Vec3::ONE),
-        metallic,
-        roughness,
-        specular,
+        metallic: Scalar::Constant(metallic),
+        roughness: Scalar::Constant(roughness),
+        specular: Scalar::Constant(specular),
+        ..Material::default()
     }
 }
 
@@ -116,6 +132,7 @@ struct Setup {
     film: Film,
     materials: Vec<Material>,
     lights: Vec<Light>,
+    integrator: Integrator,
 }
 
 impl Setup {
@@ -125,24 +142,24 @@ impl Setup {
             camera: Camera {
                 position: Vec3::new(0.0, 4.0, 3.0),
                 target: Vec3::ZERO,
-                up: Vec3::Y,
                 fov: 0.6,
+                ..Camera::default()
             },
             film: Film {
                 width: 45,
                 height: 30,
                 spp: 4,
                 seed: 1,
-                exposure: 0.0,
-                tone: ToneCurve::Standard,
+                ..Film::default()
             },
             materials: vec![white],
             lights,
+            integrator: Integrator::Beauty,
         }
     }
 
-    fn render_tiled(&self, tile_size: u32) -> Picture {
-        let input = RenderInput {
+    fn input(&self) -> RenderInput<'_> {
+        RenderInput {
             tracer: &self.shapes,
             surfaces: &self.shapes,
             camera: &self.camera,
@@ -150,8 +167,30 @@ impl Setup {
             materials: &self.materials,
             object_materials: &[0, 0],
             lights: &self.lights,
+            integrator: &self.integrator,
+        }
+    }
+
+    /// Gives `frame` what it lacks, in tiles of this size.
+    fn go_on(&self, frame: &mut Frame, tile: u32) -> Outcome {
+        let control = Control {
+            tile: Some(tile),
+            ..Control::default()
         };
-        super::render_tiled(&input, tile_size, &|_, _| ())
+        render_frame(&self.input(), frame, control)
+    }
+
+    /// The film's window with the samples of these numbers.
+    fn frame(&self, samples: Range<u32>) -> Frame {
+        let mut frame = Frame::new(&self.film, samples, Objects::new(["plane", "sphere"]));
+        self.go_on(&mut frame, 16);
+        frame
+    }
+
+    fn render_tiled(&self, tile: u32) -> Picture {
+        let mut frame = Frame::new(&self.film, 0..self.film.spp, Objects::default());
+        let outcome = self.go_on(&mut frame, tile);
+        Picture::new(&frame, &outcome)
     }
 
     fn mean(&self) -> Vec3 {
@@ -266,7 +305,14 @@ fn the_sky_exposes_well_at_exposure_zero() {
 #[test]
 fn the_same_bits_for_any_tiling_and_any_number_of_threads() {
     let lights = vec![sun(30.0), uniform_environment()];
-    let scene = Setup::new(true, material(0.3, 0.3, 0.5), lights);
+    let mut scene = Setup::new(true, material(0.3, 0.3, 0.5), lights);
+    for integrator in [Integrator::Beauty, Integrator::Path(PathLimits::default())] {
+        scene.integrator = integrator;
+        same_bits(&scene);
+    }
+}
+
+fn same_bits(scene: &Setup) {
     let bits = |threads, tile_size| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let picture = pool.unwrap().install(|| scene.render_tiled(tile_size));
@@ -295,17 +341,8 @@ fn seeds_differ() {
 #[test]
 fn progress_counts_every_tile_in_order() {
     let scene = Setup::new(false, material(0.0, 1.0, 0.0), vec![]);
-    let input = RenderInput {
-        tracer: &scene.shapes,
-        surfaces: &scene.shapes,
-        camera: &scene.camera,
-        film: &scene.film,
-        materials: &scene.materials,
-        object_materials: &[0, 0],
-        lights: &scene.lights,
-    };
     let seen = Mutex::new(Vec::new());
-    let picture = render(&input, &|done, total| {
+    let picture = render(&scene.input(), &|done, total| {
         seen.lock().unwrap().push((done, total))
     });
     assert_eq!(*seen.lock().unwrap(), [(1, 2), (2, 2)]);

@@ -2,6 +2,7 @@
 
 mod assets;
 mod frame;
+mod materials;
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -13,17 +14,14 @@ use std::sync::Arc;
 use glam::{Affine3A, Vec3};
 
 use super::error::{AssetError, SceneError};
-use super::file::{
-    BaseColorTable, DisplacementTable, Keyed, LightTable, MaterialTable, MeshTable, SCALE,
-    SceneFile, default_sun,
-};
-use super::load::{FileDisplacement, FileMaterial, FileTexture, load_mesh};
-use super::{Camera, Color, Film, Light, Material, ObjectShape, Scene, SceneObject, Texture};
-use crate::image::{Channel, ColorSpace};
+use super::file::{DisplacementTable, Keyed, LightTable, MeshTable, SCALE, SceneFile, default_sun};
+use super::load::{FileDisplacement, load_mesh};
+use super::{Camera, Film, Integrator, Light, Material, ObjectShape, Scene, SceneObject};
+use crate::image::Channel;
 use crate::prism::{March, PrismOptions};
 use crate::surface::{
     BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Projection,
-    Seams, UvTransform, Wrap,
+    Seams, Wrap,
 };
 use assets::Assets;
 
@@ -45,6 +43,8 @@ pub struct Loaded {
     pub maps: Vec<MapFile>,
     /// What was mended on the way, one line each.
     pub warnings: Vec<String>,
+    /// Where the file places the camera, if it does.
+    eye: Option<Keyed<Vec3>>,
 }
 
 /// One mesh under one map, as named on a command line.
@@ -69,7 +69,13 @@ pub struct MeshAndMap {
 impl Loaded {
     /// Loads the scene file at `path` and every file it names.
     pub fn from_file(path: &Path) -> Result<Self, SceneError> {
-        let file = SceneFile::read(path)?;
+        Self::from_file_with(path, &[])
+    }
+
+    /// The same with values laid over those of the file: `KEY=VALUE` in TOML, like `film.spp=64`,
+    /// `material.rock.roughness=0.2` or `light.0.strength=2`. Items of lists go by number or name.
+    pub fn from_file_with(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let file = SceneFile::read(path, overrides)?;
         let mut builder = Builder::default();
         for material in &file.materials {
             let material = builder.material(material)?;
@@ -79,11 +85,25 @@ impl Loaded {
             builder.mesh(mesh)?;
         }
         let lights = match &file.lights[..] {
+            [] if builder.materials.iter().any(Material::is_emissive) => Vec::new(),
             [] => builder.lights(&LightTable::daylight())?,
             lights => builder.lights(lights)?,
         };
         let camera = frame::camera(&file.camera, frame::bounds(&builder.objects))?;
-        Ok(builder.finish(path, camera, file.film, lights))
+        let loaded = builder.finish(path, camera, file.film, lights, file.integrator);
+        Ok(Self {
+            eye: file.camera.position,
+            ..loaded
+        })
+    }
+
+    /// The error that the camera is inside of this object; `None` where the file does not place the camera, since
+    /// what is framed is seen from outside.
+    pub fn camera_inside(&self, object: usize) -> Option<SceneError> {
+        let name = &self.scene.objects[object].name;
+        let found = format!("a point inside of {name:?}");
+        let expected = "a point outside of closed surfaces, or allow_inside = true for a room";
+        self.eye.as_ref().map(|eye| eye.refuse(found, expected))
     }
 
     /// The scene of one displaced mesh, seen by the default camera. The parts of the file become one object.
@@ -109,7 +129,13 @@ impl Loaded {
             material,
         });
         let camera = frame::default_camera(frame::bounds(&builder.objects));
-        Ok(builder.finish(mesh, camera, Film::default(), Vec::new()))
+        Ok(builder.finish(
+            mesh,
+            camera,
+            Film::default(),
+            Vec::new(),
+            Integrator::default(),
+        ))
     }
 }
 
@@ -295,69 +321,14 @@ impl Builder {
         })
     }
 
-    /// Adds a material that a mesh file gives.
-    fn file_material(&mut self, path: &Path, file: FileMaterial) -> Result<usize, AssetError> {
-        let image = match &file.base_color_texture {
-            Some(FileTexture::Path(picture)) => Some(self.assets.color(
-                picture,
-                ColorSpace::Srgb,
-                file.base_color,
-            )?),
-            Some(FileTexture::Embedded(bytes)) => {
-                Some(assets::embedded_color(path, bytes, file.base_color)?)
-            }
-            None => None,
-        };
-        let base_color = match image {
-            Some(image) => Color::Texture(Texture {
-                image,
-                wrap: Wrap::Repeat,
-                uv: UvTransform::default(),
-            }),
-            None => Color::Constant(file.base_color),
-        };
-        self.materials.push(Material {
-            name: file.name,
-            base_color,
-            metallic: file.metallic.unwrap_or(0.0),
-            roughness: file.roughness.unwrap_or(1.0),
-            specular: 0.5,
-        });
-        Ok(self.materials.len() - 1)
-    }
-
     /// Grey, for meshes that nothing else is said of.
     fn default_material(&mut self) -> usize {
         *self.default_material.get_or_insert_with(|| {
             self.materials.push(Material {
                 name: "default".into(),
-                base_color: Color::Constant(Vec3::splat(0.5)),
-                metallic: 0.0,
-                roughness: 1.0,
-                specular: 0.5,
+                ..Material::default()
             });
             self.materials.len() - 1
-        })
-    }
-
-    fn material(&mut self, table: &MaterialTable) -> Result<Material, SceneError> {
-        let base_color = match &table.base_color {
-            BaseColorTable::Constant(c) => Color::Constant(*c),
-            BaseColorTable::Texture(t) => Color::Texture(Texture {
-                image: self
-                    .assets
-                    .color(&t.file.value, t.color_space, Vec3::ONE)
-                    .map_err(|e| t.file.asset(e))?,
-                wrap: t.wrap,
-                uv: t.uv,
-            }),
-        };
-        Ok(Material {
-            name: table.name.value.clone(),
-            base_color,
-            metallic: table.metallic,
-            roughness: table.roughness,
-            specular: table.specular,
         })
     }
 
@@ -395,6 +366,7 @@ impl Builder {
                     rotation,
                     strength,
                 },
+                LightTable::Ready(ref light) => light.clone(),
             })
         };
         tables.iter().map(light).collect()
@@ -410,10 +382,18 @@ impl Builder {
         }
     }
 
-    fn finish(self, path: &Path, camera: Camera, film: Film, lights: Vec<Light>) -> Loaded {
+    fn finish(
+        self,
+        path: &Path,
+        camera: Camera,
+        film: Film,
+        lights: Vec<Light>,
+        integrator: Integrator,
+    ) -> Loaded {
         Loaded {
             maps: self.assets.into_maps(),
             warnings: self.warnings,
+            eye: None,
             scene: Scene {
                 path: path.to_owned(),
                 camera,
@@ -421,6 +401,7 @@ impl Builder {
                 objects: self.objects,
                 materials: self.materials,
                 lights,
+                integrator,
             },
         }
     }

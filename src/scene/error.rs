@@ -110,6 +110,18 @@ pub enum SceneError {
     },
 }
 
+impl SceneError {
+    /// Whether the scene's file is sound and what was laid over it is not.
+    pub fn is_override(&self) -> bool {
+        match self {
+            Self::Read { .. } => false,
+            Self::Syntax { place, .. } | Self::Value { place, .. } | Self::Asset { place, .. } => {
+                place.file == Path::new(super::file::OPTION)
+            }
+        }
+    }
+}
+
 /// Why a file that a scene or the command line names was refused.
 #[derive(Debug, Error)]
 pub enum AssetError {

@@ -3,143 +3,33 @@
 //! `file -> Scene -> World -> Tracer`; the renderer reads the rest (camera, film, materials, lights) from here.
 
 mod build;
+mod camera;
 mod error;
 mod file;
+mod film;
+mod fingerprint;
+mod integrator;
+mod light;
 pub mod load;
+mod material;
 mod world;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{Affine3A, Vec3};
+use glam::Affine3A;
 
-use crate::image::{ColorImage, EnvironmentImage};
 use crate::prism::PrismOptions;
-use crate::surface::{BaseMesh, DisplacedSurface, UvTransform, Wrap};
+use crate::surface::{BaseMesh, DisplacedSurface};
 
 pub use build::{Loaded, MapFile, MeshAndMap};
+pub use camera::{Camera, Lens, Projection};
 pub use error::{AssetError, Place, SceneError};
-pub(crate) use file::{MAX_SIDE, MAX_SPP, STEP_TEXELS, too_many_pixels};
-
-/// A perspective camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    /// Eye point.
-    pub position: Vec3,
-    /// Point looked at; differs from `position`.
-    pub target: Vec3,
-    /// Up direction, not parallel to the view.
-    pub up: Vec3,
-    /// Vertical field of view, radians, in (0, pi).
-    pub fov: f32,
-}
-
-impl Camera {
-    /// The angle of one of `height` rows of pixels, radians, in the middle of the picture: the spread of the cone around a camera ray.
-    pub fn pixel_spread(&self, height: u32) -> f32 {
-        2.0 * (0.5 * self.fov).tan() / height as f32
-    }
-}
-
-/// How linear radiance becomes an 8-bit picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ToneCurve {
-    /// A filmic shoulder and toe, then sRGB.
-    #[default]
-    Filmic,
-    /// sRGB only, clipped.
-    Standard,
-}
-
-/// Size and sampling of the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Film {
-    /// Pixels across.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-    /// Samples per pixel, at least 1.
-    pub spp: u32,
-    /// Seed of all randomness.
-    pub seed: u32,
-    /// Stops: radiance is multiplied by 2^exposure.
-    pub exposure: f32,
-    /// For PNG; EXR stays linear.
-    pub tone: ToneCurve,
-}
-
-/// A colour texture, linear RGB in memory.
-#[derive(Clone, Debug)]
-pub struct Texture {
-    /// The picture.
-    pub image: Arc<ColorImage>,
-    /// Outside [0, 1].
-    pub wrap: Wrap,
-    /// Applied to the mesh's texture coordinates.
-    pub uv: UvTransform,
-}
-
-/// A colour, constant or textured.
-#[derive(Clone, Debug)]
-pub enum Color {
-    /// Linear RGB.
-    Constant(Vec3),
-    /// From a picture.
-    Texture(Texture),
-}
-
-/// A first subset of the principled material.
-#[derive(Clone, Debug)]
-pub struct Material {
-    /// For messages.
-    pub name: String,
-    /// Diffuse albedo, or the reflectance at normal incidence of a metal.
-    pub base_color: Color,
-    /// 0 dielectric .. 1 metal.
-    pub metallic: f32,
-    /// 0 mirror .. 1; alpha = roughness^2.
-    pub roughness: f32,
-    /// Dielectric reflectance at normal incidence is 0.08 * specular.
-    pub specular: f32,
-}
-
-impl Material {
-    /// Whether rays go through. None does yet: all materials of this subset are opaque.
-    pub fn is_transmissive(&self) -> bool {
-        false
-    }
-}
-
-/// A source of light.
-#[derive(Clone, Debug)]
-pub enum Light {
-    /// A distant disk of the sun's size.
-    Sun {
-        /// Unit vector towards the sun.
-        direction: Vec3,
-        /// 1 is a clear day's sun in the sky model's units.
-        strength: f32,
-    },
-    /// A clear daylight sky.
-    Sky {
-        /// Unit vector towards the sun.
-        sun_direction: Vec3,
-        /// 2 (very clear) .. 10 (hazy).
-        turbidity: f32,
-        /// Multiplier.
-        strength: f32,
-    },
-    /// An equirectangular picture around the scene, +Y up.
-    Environment {
-        /// The picture.
-        image: Arc<EnvironmentImage>,
-        /// Radians about +Y.
-        rotation: f32,
-        /// Multiplier.
-        strength: f32,
-    },
-}
+pub(crate) use file::{MAX_SIDE, MAX_SPP, MAX_STOPS, STEP_TEXELS, fits, too_many_pixels};
+pub use film::{Adaptive, Aov, AovSet, Film, Filter, FilterShape, ToneCurve, Window};
+pub use integrator::{Integrator, PathLimits, View};
+pub use light::Light;
+pub use material::{Color, Coordinates, Detail, Material, Scalar, ScalarTexture, Texture};
 
 /// What an object is made of.
 #[derive(Clone, Debug)]
@@ -180,4 +70,6 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Lights.
     pub lights: Vec<Light>,
+    /// What is computed for a camera ray.
+    pub integrator: Integrator,
 }

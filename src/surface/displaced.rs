@@ -72,6 +72,8 @@ pub struct SurfacePoint {
     pub position: Vec3,
     /// P(b).
     pub base_position: Vec3,
+    /// Unit interpolated normal of the base mesh.
+    pub base_normal: Vec3,
     /// Unit geometric normal of S (its true tangent plane), on the base mesh's outer side.
     pub geometric_normal: Vec3,
     /// Unit smooth normal: Ns' = Ns - Ng + N' (the paper, equations 18 and 26).

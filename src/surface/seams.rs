@@ -307,6 +307,7 @@ impl DisplacedSurface {
         SurfacePoint {
             position: (base + w * normal).as_vec3(),
             base_position: base.as_vec3(),
+            base_normal: normal.normalize_or(ruled.patch.face_normal()).as_vec3(),
             geometric_normal: outward,
             shading_normal: outward,
             texcoord: st0 + b1 as f32 * (st1 - st0) + b2 as f32 * (st2 - st0),

@@ -10,7 +10,7 @@ use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
 pub use edit::Edited;
 pub(crate) use edit::grown;
 pub use offset::RayOffset;
-pub use world::{Object, Placement, Resolved, Shape, World};
+pub use world::{Object, PlacedObject, Placement, Resolved, Shape, World};
 
 /// Instance levels a hit can hold: one, as Debian's Embree is built.
 pub const MAX_INSTANCE_LEVELS: usize = 1;
@@ -35,6 +35,17 @@ pub struct Hit {
     pub inst: [u32; MAX_INSTANCE_LEVELS],
     /// Unit geometric normal in the object's own space.
     pub ng: Vec3,
+}
+
+impl Hit {
+    /// Index into [`World::top_level`].
+    pub fn top(&self) -> u32 {
+        if self.inst[0] == INVALID_ID {
+            self.geom
+        } else {
+            self.inst[0]
+        }
+    }
 }
 
 /// Something that traces rays through a [`World`].

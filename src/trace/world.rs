@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Vec2, Vec3};
 
 use super::{Hit, INVALID_ID};
 use crate::prism::{PrismHit, Prisms};
@@ -16,6 +16,16 @@ pub enum Shape {
     Displaced(Arc<Prisms>),
     /// An undisplaced mesh as ordinary triangles.
     Triangles(Arc<BaseMesh>),
+}
+
+impl Shape {
+    /// The mesh, not displaced.
+    pub fn mesh(&self) -> &Arc<BaseMesh> {
+        match self {
+            Self::Displaced(prisms) => prisms.surface().mesh(),
+            Self::Triangles(mesh) => mesh,
+        }
+    }
 }
 
 /// Where an object stands.
@@ -55,6 +65,40 @@ pub struct Resolved<'w> {
     pub transform: Option<&'w Affine3A>,
 }
 
+/// An object as it stands once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlacedObject {
+    /// Index into [`World::objects`].
+    pub object: usize,
+    /// Its number in [`World::top_level`].
+    pub top: u32,
+    /// Whether it stands there through an instance.
+    pub instanced: bool,
+    /// Base triangles; walls not counted.
+    pub triangles: u32,
+}
+
+impl PlacedObject {
+    /// A hit on it at barycentric coordinates `uv` of a base triangle, such as a tracer reports; without ray
+    /// parameter and normal.
+    pub fn hit(&self, prim: u32, uv: Vec2) -> Hit {
+        let (geom, inst) = if self.instanced {
+            (0, self.top)
+        } else {
+            (self.top, INVALID_ID)
+        };
+        Hit {
+            t: 0.0,
+            u: uv.x,
+            v: uv.y,
+            prim,
+            geom,
+            inst: [inst],
+            ng: Vec3::Z,
+        }
+    }
+}
+
 impl World {
     /// A world of these objects. Top-level ids count the objects in order, an instanced object once per transform.
     pub fn new(objects: Vec<Object>) -> Self {
@@ -82,18 +126,70 @@ impl World {
 
     /// Which object a hit is on, and through which instance.
     pub fn resolve(&self, hit: &Hit) -> Resolved<'_> {
-        let top = if hit.inst[0] == INVALID_ID {
-            hit.geom
-        } else {
-            hit.inst[0]
-        };
-        let (object, instance) = self.top_level[top as usize];
+        let (object, instance) = self.top_level[hit.top() as usize];
         let object = object as usize;
         let transform = match (&self.objects[object].placement, instance) {
             (Placement::Instances(t), Some(k)) => Some(&t[k as usize]),
             _ => None,
         };
         Resolved { object, transform }
+    }
+
+    /// Every object once per place where it stands, in the order of top-level ids.
+    pub fn placed(&self) -> Vec<PlacedObject> {
+        let placed = self.top_level.iter().zip(0..);
+        let placed = placed.map(|(&(object, instance), top)| PlacedObject {
+            object: object as usize,
+            top,
+            instanced: instance.is_some(),
+            triangles: self.objects[object as usize].shape.mesh().triangles().len() as u32,
+        });
+        placed.collect()
+    }
+
+    /// |dS/du x dS/dv| at a hit, square world units; `None` on a wall.
+    pub fn area_element(&self, hit: &Hit) -> Option<f32> {
+        let Resolved { object, transform } = self.resolve(hit);
+        let shape = &self.objects[object].shape;
+        if hit.prim as usize >= shape.mesh().triangles().len() {
+            return None;
+        }
+        let [du, dv] = match shape {
+            Shape::Displaced(prisms) => {
+                let patch = prisms.surface().patch(hit.prim);
+                let point = patch.point(f64::from(hit.u), f64::from(hit.v));
+                [point.du.as_vec3(), point.dv.as_vec3()]
+            }
+            Shape::Triangles(mesh) => {
+                let [v0, v1, v2] = mesh.corners(hit.prim);
+                [v1 - v0, v2 - v0]
+            }
+        };
+        let place = |v: Vec3| transform.map_or(v, |t| t.transform_vector3(v));
+        Some(place(du).cross(place(dv)).length())
+    }
+
+    /// dP/ds and dP/dt of the undisplaced mesh along its texture coordinates at a hit, in world space; `None` on a
+    /// wall, and where the texture coordinates have no area.
+    pub fn tangents(&self, hit: &Hit) -> Option<[Vec3; 2]> {
+        let Resolved { object, transform } = self.resolve(hit);
+        let mesh = self.objects[object].shape.mesh();
+        if hit.prim as usize >= mesh.triangles().len() || mesh.texcoords().is_empty() {
+            return None;
+        }
+        let [v0, v1, v2] = mesh.corners(hit.prim);
+        let [st0, st1, st2] = mesh.corner_texcoords(hit.prim);
+        let (a, b) = (st1 - st0, st2 - st0);
+        let inverse = 1.0 / a.perp_dot(b);
+        if !inverse.is_finite() {
+            return None;
+        }
+        let place = |v: Vec3| transform.map_or(v, |t| t.transform_vector3(v));
+        let (e1, e2) = (v1 - v0, v2 - v0);
+        Some([
+            place((b.y * e1 - a.y * e2) * inverse),
+            place((a.x * e2 - b.x * e1) * inverse),
+        ])
     }
 
     /// All a shader wants to know of a hit, in world space.
@@ -167,11 +263,13 @@ fn triangle_point(mesh: &BaseMesh, hit: &Hit) -> SurfacePoint {
     let [st0, st1, st2] = mesh.corner_texcoords(hit.prim);
     let position = b.x * v0 + b.y * v1 + b.z * v2;
     let geometric_normal = (v1 - v0).cross(v2 - v0).normalize();
+    let normal = (b.x * n0 + b.y * n1 + b.z * n2).normalize_or(geometric_normal);
     SurfacePoint {
         position,
         base_position: position,
+        base_normal: normal,
         geometric_normal,
-        shading_normal: (b.x * n0 + b.y * n1 + b.z * n2).normalize_or(geometric_normal),
+        shading_normal: normal,
         texcoord: b.x * st0 + b.y * st1 + b.z * st2,
         displacement: 0.0,
         tolerance: 0.0,
@@ -185,6 +283,7 @@ fn transformed(point: &SurfacePoint, to_world: &Affine3A) -> SurfacePoint {
     SurfacePoint {
         position: to_world.transform_point3(point.position),
         base_position: to_world.transform_point3(point.base_position),
+        base_normal: normal(point.base_normal),
         geometric_normal: normal(point.geometric_normal),
         shading_normal: normal(point.shading_normal),
         ..*point

@@ -301,10 +301,7 @@ fn a_height_that_is_not_finite_is_refused_with_its_place() {
     let folder = Folder::new();
     let path = folder.path("bad.exr");
     let samples = vec![0.0, 0.0, 0.0, f32::NAN, 0.0, 0.0];
-    let channel = ExrChannel {
-        name: "Y".to_owned(),
-        samples,
-    };
+    let channel = ExrChannel::floats("Y", samples);
     write_exr(&path, 2, 3, vec![channel], &[]).unwrap();
     let error = load(&path).unwrap_err();
     assert!(matches!(error, ImageError::Map { .. }));

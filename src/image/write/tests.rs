@@ -8,7 +8,7 @@ fn an_rgb_png_comes_back() {
     let folder = Folder::new();
     let path = folder.path("rgb.png");
     let pixels = [[1, 2, 3], [4, 5, 6]];
-    write_png_rgb8(&path, 1, 2, &pixels).unwrap();
+    write_png_rgb8(&path, 1, 2, &pixels, &[]).unwrap();
     let read = load_color(&path, ColorSpace::Srgb).unwrap();
     assert!(matches!(read.pixels, ColorPixels::Srgb8(p) if p == pixels));
 }

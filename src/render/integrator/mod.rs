@@ -1,13 +1,17 @@
-//! What a camera ray brings home. One integrator so far; the next ones stand beside it.
+//! What a camera ray brings home: one file per integrator.
 
-mod beauty;
+mod ao;
+mod bodies;
+mod path;
+mod stage;
+mod view;
 
-use glam::Vec3;
-
-pub use beauty::Beauty;
-
+use super::RenderInput;
+use super::bsdf::Bounce;
+use super::film::CameraSample;
 use super::sampler::Sampler;
 use crate::ray::Ray;
+use crate::scene;
 
 /// Rays traced, by type.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,14 +20,30 @@ pub struct RayCounts {
     pub camera: u64,
     /// Towards a light.
     pub shadow: u64,
-    /// Off a surface.
+    /// On from a diffuse surface.
+    pub diffuse: u64,
+    /// Off a coat, a metal or a dielectric.
     pub reflection: u64,
+    /// Through a dielectric, or back inside it.
+    pub refraction: u64,
 }
 
 impl RayCounts {
     /// All rays.
     pub fn total(&self) -> u64 {
-        self.camera + self.shadow + self.reflection
+        self.camera + self.shadow + self.diffuse + self.reflection + self.refraction
+    }
+}
+
+impl RayCounts {
+    /// A ray that goes on from a surface.
+    fn count(&mut self, bounce: Bounce) {
+        let kind = match bounce {
+            Bounce::Diffuse => &mut self.diffuse,
+            Bounce::Glossy => &mut self.reflection,
+            Bounce::Transmission => &mut self.refraction,
+        };
+        *kind += 1;
     }
 }
 
@@ -31,12 +51,34 @@ impl std::ops::AddAssign for RayCounts {
     fn add_assign(&mut self, other: Self) {
         self.camera += other.camera;
         self.shadow += other.shadow;
+        self.diffuse += other.diffuse;
         self.reflection += other.reflection;
+        self.refraction += other.refraction;
     }
 }
 
 /// Estimates the radiance that arrives along a camera ray.
 pub trait Integrator: Sync {
-    /// One estimate. `sampler` is its only randomness; the rays it traces are added to `rays`.
-    fn radiance(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> Vec3;
+    /// One estimate, and what the ray met first. `sampler` is its only randomness; the rays it traces are added to `rays`.
+    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample;
 }
+
+/// The opaque object that the camera is inside of.
+pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
+    stage::Stage::new(input).enclosing_object(input.camera.position)
+}
+
+/// The integrator that a scene asks for.
+pub fn prepare<'a>(input: &RenderInput<'a>) -> Box<dyn Integrator + 'a> {
+    match *input.integrator {
+        scene::Integrator::Path(limits) => {
+            Box::new(path::Path::new(input, path::Options::global(limits)))
+        }
+        scene::Integrator::Beauty => Box::new(path::Path::new(input, path::Options::beauty())),
+        scene::Integrator::Ao { distance } => Box::new(ao::Ao::new(input, distance)),
+        scene::Integrator::View(view) => Box::new(view::Look::new(input, view)),
+    }
+}
+
+#[cfg(all(test, feature = "bvh"))]
+mod tests;

@@ -82,11 +82,11 @@ impl InfiniteLight for Environment {
     fn sample(&self, _normal: Vec3, u: Vec2) -> LightSample {
         let (local, pdf) = self.distribution.sample(u);
         let direction = self.to_world(local);
-        LightSample {
-            direction,
-            radiance: self.radiance(direction),
-            pdf,
-        }
+        LightSample::far(direction, self.radiance(direction), pdf)
+    }
+
+    fn brightness(&self) -> f32 {
+        self.strength * self.distribution.integral()
     }
 
     fn pdf(&self, _normal: Vec3, direction: Vec3) -> f32 {

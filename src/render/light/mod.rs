@@ -1,13 +1,19 @@
-//! Where light comes from. Every light of this room is infinitely far away: the sun's disk, the sky, an HDR
-//! picture all around, or a white world when a scene has none.
+//! Where light comes from: far away (sun, sky, an HDR picture, parallel light, or a white world when a scene has
+//! none), from shapes and points in the scene, and from surfaces that shine.
 
 mod color;
+mod cumulative;
 mod environment;
 mod latlong;
+mod mesh;
+mod point;
+mod shape;
 mod sky;
 mod sphere_distribution;
 mod sun;
 mod white;
+
+use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
@@ -16,7 +22,15 @@ pub use sky::Sky;
 pub use sun::Sun;
 pub use white::WhiteWorld;
 
+use super::RenderInput;
+use crate::ray::Ray;
 use crate::scene::Light;
+use crate::surface::SurfacePoint;
+use crate::trace::Hit;
+use cumulative::Cumulative;
+use mesh::MeshLights;
+use point::{Cone, DirectionalLight, PointLight};
+use shape::{FlatLight, SphereLight};
 
 /// Luminance, in kcd/m^2, of radiance 1: about that of a white wall in full sun, so that daylight exposes
 /// well at exposure 0.
@@ -30,10 +44,36 @@ const CLEAR: f32 = 3.0;
 pub struct LightSample {
     /// Unit vector towards the light.
     pub direction: Vec3,
-    /// Radiance from there, linear RGB.
+    /// How far it is; infinite for lights outside the scene.
+    pub distance: f32,
+    /// Radiance from there, linear RGB; for a light without extent the irradiance of a surface that faces it.
     pub radiance: Vec3,
     /// Density of this direction per steradian, positive; 0 for a sample to be ignored.
     pub pdf: f32,
+    /// Whether no other way than sampling the light finds this direction; `pdf` then is a probability.
+    pub is_delta: bool,
+}
+
+impl LightSample {
+    /// To be ignored.
+    const NONE: Self = Self {
+        direction: Vec3::Y,
+        distance: 0.0,
+        radiance: Vec3::ZERO,
+        pdf: 0.0,
+        is_delta: false,
+    };
+
+    /// From outside the scene.
+    fn far(direction: Vec3, radiance: Vec3, pdf: f32) -> Self {
+        Self {
+            direction,
+            distance: f32::INFINITY,
+            radiance,
+            pdf,
+            is_delta: false,
+        }
+    }
 }
 
 /// A light infinitely far away.
@@ -46,90 +86,250 @@ pub trait InfiniteLight: Send + Sync {
     /// Every direction above the surface with any radiance has a positive density.
     fn sample(&self, normal: Vec3, u: Vec2) -> LightSample;
 
+    /// Luminance integrated over all directions.
+    fn brightness(&self) -> f32;
+
     /// The density per steradian with which [`sample`](Self::sample) finds `direction`.
     fn pdf(&self, normal: Vec3, direction: Vec3) -> f32;
 }
 
-/// The lights of a scene, ready to be sampled; a white world of radiance 1 if it has none.
-///
-/// A sun is seen through the air of the first sky, or through clear air.
-pub fn prepare(lights: &[Light]) -> Vec<Box<dyn InfiniteLight>> {
-    if lights.is_empty() {
-        return vec![Box::new(WhiteWorld)];
-    }
-    let air = lights
-        .iter()
-        .find_map(|light| match light {
-            Light::Sky { turbidity, .. } => Some(*turbidity),
-            _ => None,
-        })
-        .unwrap_or(CLEAR);
-    lights.iter().map(|light| one(light, air)).collect()
+/// A light at some place in the scene.
+trait LocalLight: Send + Sync {
+    /// A direction for the uniform point `u`, to light `position`.
+    fn sample(&self, position: Vec3, u: Vec2) -> LightSample;
+
+    /// The density per steradian with which [`sample`](Self::sample) finds `direction` from `position`.
+    fn pdf(&self, position: Vec3, direction: Vec3) -> f32;
+
+    /// Where a ray meets it, and the radiance it brings home.
+    fn meet(&self, origin: Vec3, direction: Vec3) -> Option<(f32, Vec3)>;
+
+    /// Radiant power, by luminance.
+    fn power(&self) -> f32;
 }
 
-fn one(light: &Light, air: f32) -> Box<dyn InfiniteLight> {
-    match light {
+/// A point that is lit.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Where.
+    pub position: Vec3,
+    /// Unit normal on the side that is lit.
+    pub normal: Vec3,
+}
+
+/// All lights of a scene.
+pub struct Lights<'a> {
+    infinite: Vec<Box<dyn InfiniteLight>>,
+    local: Vec<Box<dyn LocalLight>>,
+    meshes: Option<MeshLights<'a>>,
+    choice: Cumulative,
+    /// Whether each point is lit by all of them, or by one.
+    all: bool,
+}
+
+impl<'a> Lights<'a> {
+    /// The lights of `input`, ready to be sampled: all at each point, or one that is chosen by its power. A scene
+    /// without any is lit by a white world of radiance 1.
+    ///
+    /// A sun is seen through the air of the first sky, or through clear air.
+    pub fn new(input: &RenderInput<'a>, all: bool) -> Self {
+        let meshes = MeshLights::new(input);
+        let air = input.lights.iter().find_map(|light| match light {
+            Light::Sky { turbidity, .. } => Some(*turbidity),
+            _ => None,
+        });
+        let (mut infinite, mut local) = (Vec::new(), Vec::new());
+        for light in input.lights {
+            match one(light, air.unwrap_or(CLEAR)) {
+                Prepared::Infinite(light) => infinite.push(light),
+                Prepared::Local(light) => local.push(light),
+            }
+        }
+        if input.lights.is_empty() && meshes.is_none() {
+            infinite.push(Box::new(WhiteWorld));
+        }
+        let radius = 0.5 * input.tracer.bounds().diagonal();
+        // What a light from afar sends through the disk that the scene shows it.
+        let disk = if radius.is_finite() && radius > 0.0 {
+            PI * radius * radius
+        } else {
+            1.0
+        };
+        let powers: Vec<f64> = infinite
+            .iter()
+            .map(|light| disk * light.brightness())
+            .chain(local.iter().map(|light| light.power()))
+            .chain(meshes.iter().map(MeshLights::power))
+            .map(f64::from)
+            .collect();
+        Self {
+            infinite,
+            local,
+            meshes,
+            choice: Cumulative::new(powers.into_iter()),
+            all,
+        }
+    }
+
+    /// How many samples light a point.
+    pub fn samples(&self) -> usize {
+        if self.all { self.count() } else { 1 }
+    }
+
+    fn count(&self) -> usize {
+        self.infinite.len() + self.local.len() + usize::from(self.meshes.is_some())
+    }
+
+    /// The sample of number `index` of a point's [`samples`](Self::samples); `choice` and `u` are uniform in [0, 1).
+    pub fn sample(&self, index: usize, receiver: &Receiver, choice: f32, u: Vec2) -> LightSample {
+        let index = if self.all {
+            index
+        } else {
+            self.choice.choose(choice).0
+        };
+        let mut sample = self.of(index, receiver, u);
+        sample.pdf *= self.chance(index);
+        sample
+    }
+
+    fn of(&self, index: usize, receiver: &Receiver, u: Vec2) -> LightSample {
+        if let Some(light) = self.infinite.get(index) {
+            return light.sample(receiver.normal, u);
+        }
+        match (self.local.get(index - self.infinite.len()), &self.meshes) {
+            (Some(light), _) => light.sample(receiver.position, u),
+            (None, Some(meshes)) => meshes.sample(receiver.position, u),
+            (None, None) => LightSample::NONE,
+        }
+    }
+
+    fn chance(&self, index: usize) -> f32 {
+        if self.all {
+            1.0
+        } else {
+            self.choice.probability(index)
+        }
+    }
+
+    /// All that `ray` meets of lights before `reach`, but for shining surfaces: `found` is told the distance, the
+    /// radiance, and the density per steradian with which [`sample`](Self::sample) finds it from `receiver`.
+    pub fn meet(
+        &self,
+        ray: &Ray,
+        reach: f32,
+        receiver: Option<&Receiver>,
+        mut found: impl FnMut(f32, Vec3, f32),
+    ) {
+        if reach == f32::INFINITY {
+            for (index, light) in self.infinite.iter().enumerate() {
+                let radiance = light.radiance(ray.direction);
+                if radiance != Vec3::ZERO {
+                    let pdf = receiver.map_or(0.0, |r| light.pdf(r.normal, ray.direction));
+                    found(reach, radiance, self.chance(index) * pdf);
+                }
+            }
+        }
+        for (index, light) in self.local.iter().enumerate() {
+            if let Some((t, radiance)) = light.meet(ray.origin, ray.direction)
+                && t < reach
+            {
+                let pdf = receiver.map_or(0.0, |r| light.pdf(r.position, ray.direction));
+                found(t, radiance, self.chance(self.infinite.len() + index) * pdf);
+            }
+        }
+    }
+
+    /// The density per steradian with which [`sample`](Self::sample) finds a shining surface from `receiver`.
+    pub fn surface_pdf(&self, hit: &Hit, point: &SurfacePoint, receiver: &Receiver) -> f32 {
+        let pdf = |meshes: &MeshLights| meshes.pdf(hit, point, receiver.position);
+        self.meshes.as_ref().map_or(0.0, pdf) * self.chance(self.count() - 1)
+    }
+}
+
+/// A light ready to be sampled.
+enum Prepared {
+    Infinite(Box<dyn InfiniteLight>),
+    Local(Box<dyn LocalLight>),
+}
+
+fn one(light: &Light, air: f32) -> Prepared {
+    match *light {
         Light::Sun {
             direction,
             strength,
-        } => Box::new(Sun::new(*direction, air, *strength)),
+        } => Prepared::infinite(Sun::new(direction, air, strength)),
         Light::Sky {
             sun_direction,
             turbidity,
             strength,
-        } => Box::new(Sky::new(*sun_direction, *turbidity, *strength)),
+        } => Prepared::infinite(Sky::new(sun_direction, turbidity, strength)),
         Light::Environment {
-            image,
+            ref image,
             rotation,
             strength,
-        } => Box::new(Environment::new(image.clone(), *rotation, *strength)),
+        } => Prepared::infinite(Environment::new(image.clone(), rotation, strength)),
+        Light::Directional {
+            direction,
+            irradiance,
+        } => Prepared::infinite(DirectionalLight {
+            direction,
+            irradiance,
+        }),
+        Light::Sphere {
+            center,
+            radius,
+            radiance,
+        } => Prepared::local(SphereLight {
+            center,
+            radius,
+            radiance,
+        }),
+        Light::Disk {
+            center,
+            normal,
+            radius,
+            radiance,
+        } => Prepared::local(FlatLight::disk(center, normal, radius, radiance)),
+        Light::Rectangle {
+            corner,
+            edges,
+            radiance,
+        } => Prepared::local(FlatLight::rectangle(corner, edges, radiance)),
+        Light::Point {
+            position,
+            intensity,
+        } => Prepared::local(PointLight {
+            position,
+            intensity,
+            cone: None,
+        }),
+        Light::Spot {
+            position,
+            direction,
+            cos_outer,
+            cos_inner,
+            intensity,
+        } => Prepared::local(PointLight {
+            position,
+            intensity,
+            cone: Some(Cone {
+                axis: direction,
+                cos_outer,
+                cos_inner,
+            }),
+        }),
+    }
+}
+
+impl Prepared {
+    fn infinite(light: impl InfiniteLight + 'static) -> Self {
+        Self::Infinite(Box::new(light))
+    }
+
+    fn local(light: impl LocalLight + 'static) -> Self {
+        Self::Local(Box::new(light))
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_scene_without_lights_is_white() {
-        let lights = prepare(&[]);
-        assert_eq!(lights.len(), 1);
-        assert_eq!(lights[0].radiance(Vec3::NEG_Y), Vec3::ONE);
-    }
-
-    /// The law of every light: the mean of radiance * cos / pdf over samples is the irradiance that a fine
-    /// grid of directions finds, and the density of a sample is what `pdf` says, but for samples on the
-    /// border of two cells.
-    #[test]
-    fn sampled_irradiance_is_the_integral_of_radiance() {
-        let direction = Vec3::new(0.3, 0.8, 0.1).normalize();
-        let sky = Sky::new(direction, 4.0, 1.0);
-        let normal = Vec3::new(0.2, 0.9, -0.3).normalize();
-        let grid = 600;
-        let mut expected = Vec3::ZERO;
-        for row in 0..grid {
-            for column in 0..2 * grid {
-                let uv = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) / grid as f32;
-                let theta = std::f32::consts::PI * uv.y;
-                let d = latlong::direction(Vec2::new(0.5 * uv.x, theta.cos()));
-                let solid_angle = (std::f32::consts::PI / grid as f32).powi(2) * theta.sin();
-                expected += sky.radiance(d) * d.dot(normal).max(0.0) * solid_angle;
-            }
-        }
-        let n = 40_000;
-        let mut sum = Vec3::ZERO;
-        let mut on_borders = 0;
-        for i in 0..n {
-            let u = Vec2::new(i as f32 / n as f32, (i as f32 * 0.618_034).fract());
-            let s = sky.sample(normal, u);
-            on_borders += u32::from((s.pdf - sky.pdf(normal, s.direction)).abs() > 1e-3 * s.pdf);
-            sum += s.radiance * s.direction.dot(normal).max(0.0) / s.pdf;
-        }
-        assert!(on_borders < n / 500, "{on_borders}");
-        let measured = sum / n as f32;
-        assert!(
-            (measured / expected - 1.0).abs().max_element() < 0.01,
-            "{measured} {expected}"
-        );
-    }
-}
+mod tests;

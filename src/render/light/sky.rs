@@ -190,11 +190,11 @@ impl InfiniteLight for Sky {
 
     fn sample(&self, _normal: Vec3, u: Vec2) -> LightSample {
         let (direction, pdf) = self.distribution.sample(u);
-        LightSample {
-            direction,
-            radiance: self.radiance(direction),
-            pdf,
-        }
+        LightSample::far(direction, self.radiance(direction), pdf)
+    }
+
+    fn brightness(&self) -> f32 {
+        self.distribution.integral()
     }
 
     fn pdf(&self, _normal: Vec3, direction: Vec3) -> f32 {

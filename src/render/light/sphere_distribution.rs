@@ -7,6 +7,7 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
+use super::cumulative::{find, push};
 use super::latlong;
 
 /// A density per steradian over all directions.
@@ -20,6 +21,7 @@ pub struct SphereDistribution {
     rows: Vec<f32>,
     /// Cosine of the polar angle at the upper border of each row, and -1.
     cosines: Vec<f32>,
+    integral: f32,
 }
 
 impl SphereDistribution {
@@ -37,24 +39,32 @@ impl SphereDistribution {
         let mut row_weights = Vec::with_capacity(height);
         for row in 0..height {
             let weights = (0..width).map(|column| f64::from(brightness(column, row)));
-            let sum = push_cumulative(&mut cells, weights, width);
+            let sum = push(&mut cells, weights);
             row_weights.push(sum * f64::from(cosines[row] - cosines[row + 1]));
         }
-        if row_weights.iter().all(|&weight| weight == 0.0) {
+        let dark = row_weights.iter().all(|&weight| weight == 0.0);
+        if dark {
             // A dark sphere: equal solid angles are equally likely.
             for (row, weight) in row_weights.iter_mut().enumerate() {
                 *weight = f64::from(cosines[row] - cosines[row + 1]);
             }
         }
         let mut rows = Vec::with_capacity(height + 1);
-        push_cumulative(&mut rows, row_weights.into_iter(), height);
+        let integral =
+            push(&mut rows, row_weights.iter().copied()) * 2.0 * f64::from(PI) / width as f64;
         Self {
             width,
             height,
             cells,
             rows,
             cosines,
+            integral: if dark { 0.0 } else { integral as f32 },
         }
+    }
+
+    /// The brightness integrated over all directions.
+    pub fn integral(&self) -> f32 {
+        self.integral
     }
 
     /// The direction for a uniform point `u` in [0, 1)^2, and its density per steradian.
@@ -91,39 +101,10 @@ impl SphereDistribution {
     }
 }
 
-/// Appends 0, then the running sums of `count` weights divided by their sum, which is returned. Weights that
-/// are all 0 count as equal.
-fn push_cumulative(
-    out: &mut Vec<f32>,
-    weights: impl Iterator<Item = f64> + Clone,
-    count: usize,
-) -> f64 {
-    let sum: f64 = weights.clone().sum();
-    let mut running = 0.0;
-    out.push(0.0);
-    for (i, weight) in weights.enumerate() {
-        running += weight;
-        out.push(if sum > 0.0 {
-            // Exactly 1 at the end: the same additions gave `sum`.
-            (running / sum) as f32
-        } else {
-            (i + 1) as f32 / count as f32
-        });
-    }
-    sum
-}
-
-/// The interval of `cumulative` that holds `u`, never an empty one, and where in it `u` lies, in [0, 1].
-fn find(cumulative: &[f32], u: f32) -> (usize, f32) {
-    // cumulative[0] = 0 <= u < 1 = cumulative's last: the result is 1 ..= len - 1.
-    let upper = cumulative.partition_point(|&c| c <= u);
-    let (low, high) = (cumulative[upper - 1], cumulative[upper]);
-    (upper - 1, (u - low) / (high - low))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::testing::{Random, assert_chi_square};
 
     const WIDTH: usize = 8;
     const HEIGHT: usize = 6;
@@ -160,42 +141,23 @@ mod tests {
         let distribution = uneven();
         let n = 50_000_u32;
         let mut counts = [[0_u32; WIDTH]; HEIGHT];
-        let mut state = 1_u64;
-        let mut random = || {
-            // Knuth's MMIX generator, upper bits.
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 40) as f32 / (1 << 24) as f32
-        };
+        let mut random = Random::new(1);
         for _ in 0..n {
-            let (direction, pdf) = distribution.sample(Vec2::new(random(), random()));
+            let (direction, pdf) = distribution.sample(random.point());
             let point = latlong::point(direction);
             let column = ((point.x * WIDTH as f32) as usize).min(WIDTH - 1);
             let row = ((point.y.acos() / PI * HEIGHT as f32) as usize).min(HEIGHT - 1);
             counts[row][column] += 1;
             assert!(pdf > 0.0);
         }
-        let (mut chi_square, mut cells) = (0.0, 0);
-        for (row, counts) in counts.iter().enumerate() {
-            for (column, &count) in counts.iter().enumerate() {
-                let border = |row: usize| (PI * row as f32 / HEIGHT as f32).cos();
-                let solid_angle = 2.0 * PI / WIDTH as f32 * (border(row) - border(row + 1));
-                let expected = n as f32 * distribution.cell_pdf(column, row) * solid_angle;
-                if expected == 0.0 {
-                    assert_eq!(count, 0);
-                } else {
-                    chi_square += (count as f32 - expected).powi(2) / expected;
-                    cells += 1;
-                }
-            }
-        }
-        // Mean k, standard deviation sqrt(2 k): 4 of them is a chance below 1e-3.
-        let freedom = (cells - 1) as f32;
-        assert!(
-            chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(),
-            "{chi_square}"
-        );
+        let border = |row: usize| (PI * row as f32 / HEIGHT as f32).cos();
+        let expected = |row: usize, column: usize| {
+            let solid_angle = 2.0 * PI / WIDTH as f32 * (border(row) - border(row + 1));
+            f64::from(n as f32 * distribution.cell_pdf(column, row) * solid_angle)
+        };
+        let cells = (0..WIDTH * HEIGHT).map(|i| (i / WIDTH, i % WIDTH));
+        let cells = cells.map(|(row, column)| (counts[row][column], expected(row, column)));
+        assert_chi_square(cells, "sphere distribution");
     }
 
     #[test]

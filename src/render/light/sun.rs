@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::color::{matching_functions, xyz_to_rgb};
+use super::color::{luminance, matching_functions, xyz_to_rgb};
 use super::{InfiniteLight, KILOCANDELA_PER_UNIT, LightSample};
 use crate::render::basis::Basis;
 
@@ -57,11 +57,15 @@ impl InfiniteLight for Sun {
         let drop = u.y * ONE_MINUS_COS_RADIUS;
         let radius = (drop * (2.0 - drop)).sqrt();
         let local = Vec3::new(radius * cos, radius * sin, 1.0 - drop);
-        LightSample {
-            direction: self.basis.to_world(local),
-            radiance: self.radiance,
-            pdf: 1.0 / solid_angle(),
-        }
+        LightSample::far(
+            self.basis.to_world(local),
+            self.radiance,
+            1.0 / solid_angle(),
+        )
+    }
+
+    fn brightness(&self) -> f32 {
+        luminance(self.radiance) * solid_angle()
     }
 
     fn pdf(&self, _normal: Vec3, direction: Vec3) -> f32 {
@@ -106,7 +110,6 @@ fn planck(micrometres: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::color::luminance;
     use super::*;
 
     #[test]

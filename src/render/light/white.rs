@@ -1,11 +1,12 @@
 //! A world that is white all around: what a scene without lights is lit by.
 
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::{Vec2, Vec3};
 
 use super::{InfiniteLight, LightSample};
 use crate::render::basis::Basis;
+use crate::render::bsdf::cosine_hemisphere;
 
 /// Radiance 1 from everywhere.
 #[derive(Clone, Copy, Debug)]
@@ -19,18 +20,13 @@ impl InfiniteLight for WhiteWorld {
     /// Cosine-weighted around the normal (Malley's method), so that an unoccluded diffuse surface shows no
     /// noise at all.
     fn sample(&self, normal: Vec3, u: Vec2) -> LightSample {
-        let (sin, cos) = (TAU * u.x).sin_cos();
-        let radius = u.y.sqrt();
-        let height = (1.0 - u.y).sqrt();
-        LightSample {
-            direction: Basis::around(normal).to_world(Vec3::new(
-                radius * cos,
-                radius * sin,
-                height,
-            )),
-            radiance: Vec3::ONE,
-            pdf: height * FRAC_1_PI,
-        }
+        let local = cosine_hemisphere(u);
+        let direction = Basis::around(normal).to_world(local);
+        LightSample::far(direction, Vec3::ONE, local.z * FRAC_1_PI)
+    }
+
+    fn brightness(&self) -> f32 {
+        4.0 * PI
     }
 
     fn pdf(&self, normal: Vec3, direction: Vec3) -> f32 {

@@ -13,10 +13,14 @@ use crate::image::{
 use crate::scene::error::AssetError;
 use crate::surface::{DisplacementMap, Wrap};
 
+/// A channel of a picture, and how it goes on outside.
+type ChannelKey = (PathBuf, Channel, Wrap);
+
 /// What has been loaded so far.
 #[derive(Default)]
 pub(super) struct Assets {
-    heights: Vec<((PathBuf, Channel, Wrap), Arc<DisplacementMap>)>,
+    heights: Vec<(ChannelKey, Arc<DisplacementMap>)>,
+    scalars: Vec<(ChannelKey, Arc<DisplacementMap>)>,
     colors: Vec<((PathBuf, ColorSpace, Vec3), Arc<ColorImage>)>,
     environments: Vec<(PathBuf, Arc<EnvironmentImage>)>,
 }
@@ -29,10 +33,17 @@ impl Assets {
         channel: &Channel,
         wrap: Wrap,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
-        let key = (identity(path), channel.clone(), wrap);
-        once(&mut self.heights, key, || {
-            image::load_heights(path, channel, wrap)
-        })
+        channel_once(&mut self.heights, path, channel, wrap)
+    }
+
+    /// A channel of a picture as a parameter of a material; apart from the heights, which are reported and edited.
+    pub fn scalar(
+        &mut self,
+        path: &Path,
+        channel: &Channel,
+        wrap: Wrap,
+    ) -> Result<Arc<DisplacementMap>, AssetError> {
+        channel_once(&mut self.scalars, path, channel, wrap)
     }
 
     /// A colour picture, times `tint`.
@@ -63,6 +74,17 @@ impl Assets {
     }
 }
 
+/// A channel of a picture, known or loaded.
+fn channel_once(
+    known: &mut Vec<(ChannelKey, Arc<DisplacementMap>)>,
+    path: &Path,
+    channel: &Channel,
+    wrap: Wrap,
+) -> Result<Arc<DisplacementMap>, AssetError> {
+    let key = (identity(path), channel.clone(), wrap);
+    once(known, key, || image::load_heights(path, channel, wrap))
+}
+
 /// What `known` has for `key`, else what `load` gives. A scene names few files: no hashing is needed.
 fn once<K: PartialEq, T>(
     known: &mut Vec<(K, Arc<T>)>,
@@ -82,12 +104,33 @@ fn identity(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
-/// The sRGB picture that the mesh file at `path` holds, times `tint`.
+/// The picture that the mesh file at `path` holds, times `tint`.
 pub(super) fn embedded_color(
     path: &Path,
     bytes: &[u8],
+    space: ColorSpace,
     tint: Vec3,
 ) -> Result<Arc<ColorImage>, AssetError> {
+    let image = unpacked(path, bytes, |file| image::load_color(file, space))?;
+    Ok(Arc::new(tinted(image, tint)))
+}
+
+/// A channel of the picture that the mesh file at `path` holds.
+pub(super) fn embedded_scalar(
+    path: &Path,
+    bytes: &[u8],
+    channel: &Channel,
+    wrap: Wrap,
+) -> Result<Arc<DisplacementMap>, AssetError> {
+    unpacked(path, bytes, |file| image::load_heights(file, channel, wrap)).map(Arc::new)
+}
+
+/// What `load` makes of a picture that the mesh file at `path` holds: its readers want a file.
+fn unpacked<T>(
+    path: &Path,
+    bytes: &[u8],
+    load: impl FnOnce(&Path) -> Result<T, ImageError>,
+) -> Result<T, AssetError> {
     let unpacked = tempfile::NamedTempFile::new().and_then(|mut file| {
         file.write_all(bytes)?;
         Ok(file)
@@ -96,13 +139,10 @@ pub(super) fn embedded_color(
         path: path.to_owned(),
         source,
     })?;
-    match image::load_color(unpacked.path(), ColorSpace::Srgb) {
-        Ok(image) => Ok(Arc::new(tinted(image, tint))),
-        Err(source) => Err(AssetError::Embedded {
-            path: path.to_owned(),
-            source,
-        }),
-    }
+    load(unpacked.path()).map_err(|source| AssetError::Embedded {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 fn tinted(image: ColorImage, tint: Vec3) -> ColorImage {

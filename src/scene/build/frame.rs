@@ -4,8 +4,8 @@ use glam::{Vec3, Vec3A};
 
 use crate::ray::Aabb;
 use crate::scene::error::SceneError;
-use crate::scene::file::CameraTable;
-use crate::scene::{Camera, ObjectShape, SceneObject};
+use crate::scene::file::{CameraTable, ProjectionTable};
+use crate::scene::{Camera, Lens, ObjectShape, Projection, SceneObject};
 
 /// From the middle of the scene to the eye: half from the right, a little from above.
 const THREE_QUARTER: Vec3 = Vec3::new(0.55, 0.45, 1.0);
@@ -74,19 +74,35 @@ pub(super) fn camera(table: &CameraTable, bounds: Aabb) -> Result<Camera, SceneE
             target,
             up,
             fov: table.fov,
+            projection: match table.projection {
+                // Where nothing is said, as high as a perspective shows at the target.
+                ProjectionTable::Orthographic { height } => Projection::Orthographic {
+                    height: height.unwrap_or(2.0 * view.length() * (0.5 * table.fov).tan()),
+                },
+                ProjectionTable::Perspective => Projection::Perspective,
+                ProjectionTable::Panorama => Projection::Panorama,
+            },
+            shift: table.shift,
+            lens: table.lens.map(|lens| Lens {
+                radius: 0.5 * lens.aperture,
+                focus: lens.focus_distance.unwrap_or(view.length()),
+                blades: lens.blades,
+                rotation: lens.blade_rotation,
+            }),
+            allow_inside: table.allow_inside,
         }),
     }
 }
 
 /// The camera of a scene without a file.
 pub(super) fn default_camera(bounds: Aabb) -> Camera {
-    let fov = CameraTable::default().fov;
+    let fov = Camera::default().fov;
     let target = 0.5 * (bounds.min + bounds.max);
     Camera {
         position: framing_eye(target, bounds, fov),
         target,
-        up: Vec3::Y,
         fov,
+        ..Camera::default()
     }
 }
 

@@ -5,6 +5,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::image::{write_png_gray16, write_png_rgb8};
+use crate::scene::{Color, Detail, Projection, Scalar};
 
 /// Two squares of two materials, the first displaced and coloured by its MTL.
 const OBJ: &str = "\
@@ -24,7 +25,7 @@ fn folder() -> TempDir {
     fs::write(path("two.obj"), OBJ).unwrap();
     fs::write(path("two.mtl"), MTL).unwrap();
     write_png_gray16(&path("height.png"), 2, 2, &[0, 65535, 65535, 0]).unwrap();
-    write_png_rgb8(&path("color.png"), 1, 1, &[[255, 0, 0]]).unwrap();
+    write_png_rgb8(&path("color.png"), 1, 1, &[[255, 0, 0]], &[]).unwrap();
     folder
 }
 
@@ -210,5 +211,109 @@ fn seams_close_on_demand_and_only_for_the_exact_march() {
     assert!(
         step.contains("displacement.dt") && step.contains("uniform"),
         "{step}"
+    );
+}
+
+#[test]
+fn all_parameters_of_a_material_arrive() {
+    let scene = "[[mesh]]\nfile = \"two.obj\"\nmaterial = \"m\"\n[[material]]\nname = \"m\"\nior = 1.3\npriority = 7\ntransmission = 1\nattenuation_color = [0.5, 1, 1]\nroughness = { file = \"height.png\", factor = 0.5 }\nopacity = { file = \"height.png\" }\nemission = { file = \"color.png\" }\nbump = { file = \"height.png\", scale = 0.25 }\n";
+    let loaded = load(&folder(), scene).unwrap();
+    let material = &loaded.scene.materials[0];
+    assert_eq!((material.ior, material.priority), (1.3, 7));
+    assert_eq!(material.attenuation_distance, 1.0);
+    assert!(material.is_transmissive() && material.is_emissive());
+    let (Scalar::Texture(roughness), Scalar::Texture(opacity)) =
+        (&material.roughness, &material.opacity)
+    else {
+        panic!("textures were written");
+    };
+    assert!(Arc::ptr_eq(&roughness.map, &opacity.map));
+    assert_eq!((roughness.factor, opacity.factor), (0.5, 1.0));
+    assert!(matches!(&material.detail, Some(Detail::Bump(b)) if b.factor == 0.25));
+    // Scalars are no displacement maps, and an emissive scene needs no sun.
+    assert!(loaded.maps.is_empty() && loaded.scene.lights.is_empty());
+    assert_eq!(material.pictures().len(), 4);
+}
+
+#[test]
+fn glass_is_closed_and_stone_is_open() {
+    let scene = |transmission: u32| {
+        format!(
+            "[[mesh]]\nfile = \"two.obj\"\nmaterial = \"m\"\n[mesh.displacement]\nscale = 1\n[[material]]\nname = \"m\"\ntransmission = {transmission}\n"
+        )
+    };
+    for (transmission, walls) in [(0, 0), (1, 4)] {
+        let loaded = load(&folder(), &scene(transmission)).unwrap();
+        assert_eq!(surface(&loaded.scene.objects[0]).walls().len(), walls);
+    }
+}
+
+#[test]
+fn missing_and_broken_pictures_are_named_where_they_are_asked_for() {
+    let folder = folder();
+    let with = |rest: &str| load(&folder, &format!("[[mesh]]\nfile = \"two.obj\"\n{rest}\n"));
+    for (rest, key) in [
+        (
+            "[[material]]\nname = \"m\"\nroughness = { file = \"none.png\" }",
+            "material[0].roughness.file",
+        ),
+        (
+            "[[material]]\nname = \"m\"\nnormal_map = { file = \"none.png\" }",
+            "material[0].normal_map.file",
+        ),
+        (
+            "[[material]]\nname = \"m\"\nemission = { file = \"two.obj\" }",
+            "material[0].emission.file",
+        ),
+        (
+            "[[light]]\ntype = \"environment\"\nfile = \"none.exr\"",
+            "light[0].file",
+        ),
+        (
+            "[[light]]\ntype = \"environment\"\nfile = \"color.png\"",
+            "light[0].file",
+        ),
+    ] {
+        let message = with(rest).unwrap_err().to_string();
+        assert!(
+            message.contains("scene.toml:") && message.contains(key),
+            "{rest}: {message}"
+        );
+    }
+}
+
+#[test]
+fn an_environment_with_a_nan_is_refused_at_its_light() {
+    let folder = folder();
+    let pixel = |x: usize, _| (x as f32, 1.0, if x == 1 { f32::NAN } else { 0.0 });
+    exr::prelude::write_rgb_file(folder.path().join("nan.exr"), 2, 1, pixel).unwrap();
+    let scene =
+        "[[mesh]]\nfile = \"two.obj\"\n[[light]]\ntype = \"environment\"\nfile = \"nan.exr\"\n";
+    let message = load(&folder, scene).unwrap_err().to_string();
+    assert!(
+        message.contains("light[0].file") && message.contains("NaN"),
+        "{message}"
+    );
+}
+
+#[test]
+fn cameras_of_all_kinds_arrive() {
+    let camera = |keys: &str| {
+        let text = format!(
+            "[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 1]\nfov = 90\n{keys}\n[[mesh]]\nfile = \"two.obj\"\n"
+        );
+        load(&folder(), &text).unwrap().scene.camera
+    };
+    let Projection::Orthographic { height } = camera("type = \"orthographic\"").projection else {
+        panic!("parallel rays were asked for");
+    };
+    // As high as a field of view of 90 degrees shows at a distance of 4.
+    assert!((height - 8.0).abs() < 1e-5);
+    let lens = camera("aperture = 0.5\nblades = 6").lens.unwrap();
+    assert_eq!((lens.radius, lens.focus, lens.blades), (0.25, 4.0, 6));
+    assert_eq!(camera("aperture = 0").lens, None);
+    assert_eq!(
+        camera("type = \"panorama\"").projection,
+        Projection::Panorama
     );
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{Affine3A, EulerRot, Quat, Vec3};
 
-use super::{Item, Keyed, STEP_TEXELS, SceneError, file_path, keyed, uv_transform, wrap};
+use super::{Item, Keyed, STEP_TEXELS, SceneError, channel, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
 use crate::prism::{EditBounds, Lod, March, PrismOptions, Step};
 use crate::surface::{Projection, Seams, UvTransform, Wrap};
@@ -173,12 +173,6 @@ fn lod(section: &mut super::Section, march: March) -> Result<Lod, SceneError> {
         return Err(no_cone);
     }
     Ok(lod)
-}
-
-fn channel(item: Item) -> Result<Channel, SceneError> {
-    let expected = "\"luminance\", \"r\", \"g\", \"b\", \"a\" or the name of an EXR channel";
-    let Ok(channel) = item.text(expected)?.parse();
-    Ok(channel)
 }
 
 /// `march`, and what belongs to the uniform one: a step or its jitter choose it where no march is named.

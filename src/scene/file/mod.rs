@@ -2,20 +2,29 @@
 //!
 //! The format is described in docs/scene.md. What is loaded from other files follows in `build`.
 
+mod camera;
+mod film;
+mod integrator;
+mod light;
+mod material;
 mod mesh;
+mod overrides;
 mod reader;
-mod shading;
-mod view;
 
 use std::path::{Path, PathBuf};
 
-use super::Film;
 use super::error::{AssetError, Place, SceneError};
+use super::{Film, Integrator};
+pub(super) use camera::{CameraTable, ProjectionTable};
+pub(crate) use film::{MAX_SIDE, MAX_SPP, MAX_STOPS, fits, too_many_pixels};
+pub(super) use light::{LightTable, default_sun};
+pub(super) use material::{
+    ColorTable, DetailTable, MaterialTable, ScalarTable, ScalarTextureTable, TextureTable,
+};
 pub(super) use mesh::{DisplacementTable, MeshTable, SCALE};
+pub(super) use overrides::OPTION;
+use overrides::Override;
 use reader::{Item, Section, Source};
-pub(super) use shading::{BaseColorTable, LightTable, MaterialTable, default_sun};
-pub(super) use view::CameraTable;
-pub(crate) use view::{MAX_SIDE, MAX_SPP, too_many_pixels};
 
 /// The least step of a march in texels, and the largest: beyond, a ray would take minutes or see nothing.
 pub(crate) const STEP_TEXELS: std::ops::RangeInclusive<f32> = 1e-3..=1e6;
@@ -28,6 +37,7 @@ pub(super) struct SceneFile {
     pub meshes: Vec<MeshTable>,
     pub materials: Vec<MaterialTable>,
     pub lights: Vec<LightTable>,
+    pub integrator: Integrator,
 }
 
 /// A value that a later step may still refuse: it remembers its key and place.
@@ -60,30 +70,39 @@ impl<T> Keyed<T> {
 }
 
 impl SceneFile {
-    /// Reads the file at `path`.
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
+    /// Reads the file at `path`, with `overrides` (`key=value`) laid over it.
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
             path: path.to_owned(),
             source,
         })?;
-        Self::parse(path, &text)
+        Self::parse_with(path, &text, overrides)
     }
 
     /// Reads the text of a scene file; `path` is for messages and to find the files it names.
-    pub fn parse(path: &Path, text: &str) -> Result<Self, SceneError> {
-        let source = Source { file: path, text };
-        let mut root = source.parse(&["camera", "film", "mesh", "material", "light"])?;
+    pub fn parse_with(path: &Path, text: &str, overrides: &[String]) -> Result<Self, SceneError> {
+        let overrides = Override::all(text.len(), overrides);
+        let source = Source {
+            file: path,
+            text,
+            overrides: &overrides,
+        };
+        let mut root =
+            source.parse(&["camera", "film", "mesh", "material", "light", "integrator"])?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Ok(Self {
             camera: root
                 .optional("camera", CameraTable::read)?
                 .unwrap_or_default(),
-            film: root.optional("film", view::film)?.unwrap_or_default(),
+            film: root.optional("film", film::film)?.unwrap_or_default(),
             meshes: tables(&mut root, "mesh", |item| MeshTable::read(item, folder))?,
             materials: tables(&mut root, "material", |item| {
                 MaterialTable::read(item, folder)
             })?,
             lights: tables(&mut root, "light", |item| LightTable::read(item, folder))?,
+            integrator: root
+                .optional("integrator", integrator::read)?
+                .unwrap_or_default(),
         })
         .and_then(|scene| scene.checked(&root))
     }
@@ -162,6 +181,18 @@ fn uv_transform(item: Item) -> Result<crate::surface::UvTransform, SceneError> {
         uv.offset = offset;
     }
     Ok(uv)
+}
+
+/// A channel of a picture.
+fn channel(item: Item) -> Result<crate::image::Channel, SceneError> {
+    let expected = "\"luminance\", \"r\", \"g\", \"b\", \"a\" or the name of an EXR channel";
+    let Ok(channel) = item.text(expected)?.parse();
+    Ok(channel)
+}
+
+/// A factor of at least 0.
+fn factor(item: Item) -> Result<f32, SceneError> {
+    item.number("a factor of at least 0", |x| x >= 0.0)
 }
 
 /// A number from 0 to 1.

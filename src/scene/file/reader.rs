@@ -10,6 +10,7 @@ use glam::{Vec2, Vec3};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::overrides::Override;
 use super::{Place, SceneError};
 
 /// What is found where a required key is missing.
@@ -20,20 +21,29 @@ const MISSING: &str = "nothing (the key is missing)";
 pub(super) struct Source<'a> {
     pub file: &'a Path,
     pub text: &'a str,
+    /// What is laid over it.
+    pub overrides: &'a [Override],
 }
 
 impl<'a> Source<'a> {
     /// The document as its root section.
     pub fn parse(self, keys: &'static [&'static str]) -> Result<Section<'a>, SceneError> {
-        let root = DeTable::parse(self.text).map_err(|e| SceneError::Syntax {
-            place: self.place(e.span().unwrap_or(0..0)),
-            message: e.message().to_owned(),
-        })?;
-        Section::open(self, String::new(), 0..0, root.into_inner(), keys)
+        let root = DeTable::parse(self.text).map_err(|e| self.syntax_error(&e))?;
+        let root = self.overridden(root.into_inner())?;
+        Section::open(self, String::new(), 0..0, root, keys)
     }
 
-    fn place(self, span: Range<usize>) -> Box<Place> {
-        Box::new(Place::new(self.file, self.text, span))
+    pub(super) fn syntax_error(self, error: &toml::de::Error) -> SceneError {
+        SceneError::Syntax {
+            place: self.place(error.span().unwrap_or(0..0)),
+            message: error.message().to_owned(),
+        }
+    }
+
+    pub(super) fn place(self, span: Range<usize>) -> Box<Place> {
+        let mut overrides = self.overrides.iter();
+        let place = overrides.find_map(|o| o.place(&span));
+        Box::new(place.unwrap_or_else(|| Place::new(self.file, self.text, span)))
     }
 }
 
@@ -153,14 +163,12 @@ impl<'a> Item<'a> {
 
     /// A whole number in `range`.
     pub fn integer(&self, range: std::ops::RangeInclusive<u32>) -> Result<u32, SceneError> {
-        let found = match &self.value {
-            DeValue::Integer(i) => u32::from_str_radix(i.as_str(), i.radix()).ok(),
-            _ => None,
-        };
-        found.filter(|i| range.contains(i)).ok_or_else(|| {
-            let (low, high) = (range.start(), range.end());
-            self.refuse(format!("a whole number from {low} to {high}"))
-        })
+        as_u32(&self.value)
+            .filter(|i| range.contains(i))
+            .ok_or_else(|| {
+                let (low, high) = (range.start(), range.end());
+                self.refuse(format!("a whole number from {low} to {high}"))
+            })
     }
 
     /// True or false.
@@ -260,13 +268,30 @@ impl<'a> Item<'a> {
         matches!(self.value, DeValue::Array(_))
     }
 
+    /// An array of `N` whole numbers that u32 can hold.
+    pub fn integers<const N: usize>(&self) -> Option<[u32; N]> {
+        self.array(as_u32)
+    }
+
     fn numbers<const N: usize>(&self) -> Option<[f32; N]> {
+        self.array(as_f32)
+    }
+
+    fn array<T, const N: usize>(&self, read: fn(&DeValue) -> Option<T>) -> Option<[T; N]> {
         let DeValue::Array(array) = &self.value else {
             return None;
         };
-        let numbers = array.iter().map(|v| as_f32(v.get_ref()));
-        let numbers: Vec<f32> = numbers.collect::<Option<_>>()?;
-        numbers.try_into().ok()
+        let items = array.iter().map(|v| read(v.get_ref()));
+        let items: Vec<T> = items.collect::<Option<_>>()?;
+        items.try_into().ok()
+    }
+}
+
+/// A whole number that u32 can hold, else `None`.
+fn as_u32(value: &DeValue) -> Option<u32> {
+    match value {
+        DeValue::Integer(i) => u32::from_str_radix(i.as_str(), i.radix()).ok(),
+        _ => None,
     }
 }
 

@@ -7,7 +7,7 @@ use crate::prism::{EditBounds, March, PrismOptions, Step};
 use crate::surface::Wrap;
 
 fn parse(text: &str) -> Result<SceneFile, SceneError> {
-    SceneFile::parse(Path::new("folder/scene.toml"), text)
+    SceneFile::parse_with(Path::new("folder/scene.toml"), text, &[])
 }
 
 fn refusal(text: &str) -> String {
@@ -49,10 +49,11 @@ fn the_documented_defaults_are_the_defaults() {
     assert_eq!(displacement.prisms.march, March::Exact);
     assert_eq!(displacement.seams, None);
     let material = &bare.materials[0];
-    assert_eq!(
-        (material.metallic, material.roughness, material.specular),
-        (0.0, 1.0, 0.5)
-    );
+    assert!(material.metallic.is_none() && material.roughness.is_none());
+    let plain = &material.plain;
+    assert!(plain.metallic.is(0.0) && plain.roughness.is(1.0) && plain.specular.is(0.5));
+    assert_eq!((plain.ior, plain.priority), (1.5, 0));
+    assert_eq!(bare.integrator, Integrator::Beauty);
 }
 
 #[test]
@@ -69,7 +70,7 @@ fn every_value_arrives() {
     let displacement = mesh.displacement.as_ref().unwrap();
     assert_eq!(displacement.scale, Some(0.2));
     assert_eq!(displacement.wrap, Some(Wrap::Repeat));
-    let BaseColorTable::Texture(texture) = &file.materials[1].base_color else {
+    let Some(ColorTable::Texture(texture)) = &file.materials[1].base_color else {
         panic!("a texture was written");
     };
     assert_eq!(texture.uv.scale, Vec2::splat(2.0));
@@ -176,6 +177,81 @@ fn odd_texts_are_refused_with_a_place() {
             "{text:?}: {message}"
         );
     }
+}
+
+#[test]
+fn values_that_no_material_light_or_camera_has_are_refused() {
+    let with = |text: &str| refusal(&format!("[[mesh]]\nfile = \"a.obj\"\n{text}\n"));
+    let material = |key: &str| with(&format!("[[material]]\nname = \"m\"\n{key}"));
+    for (key, word) in [
+        ("roughness = 1.5", "from 0 to 1"),
+        ("metallic = -0.1", "from 0 to 1"),
+        ("ior = 0.9", "from 1 to 3"),
+        ("base_color = [2, 0, 0]", "from 0 to 1"),
+        ("emission = [-1, 0, 0]", "at least 0"),
+        ("emission = [nan, 0, 0]", "at least 0"),
+        ("attenuation_distance = 0", "above 0"),
+        ("priority = -1", "whole number"),
+        ("bump = { file = \"b.png\" }", "scale"),
+        (
+            "bump = { file = \"b.png\", scale = 1 }\nnormal_map = { file = \"n.png\" }",
+            "only one",
+        ),
+        ("base_color = { file = \"c.png\", size = 2 }", "triplanar"),
+    ] {
+        let message = material(key);
+        assert!(
+            message.contains("material[0].") && message.contains(word),
+            "{key}: {message}"
+        );
+    }
+    for (light, word) in [
+        (
+            "type = \"sphere\"\nposition = [0, 0, 0]\nradius = 0",
+            "above 0",
+        ),
+        ("type = \"sphere\"\nradius = 1", "position"),
+        (
+            "type = \"disk\"\nposition = [0, 0, 0]\ntarget = [0, 0, 0]\nradius = 1",
+            "other than",
+        ),
+        (
+            "type = \"rectangle\"\ncorner = [0, 0, 0]\nedges = [[1, 0, 0], [2, 0, 0]]",
+            "span an area",
+        ),
+        (
+            "type = \"rectangle\"\ncorner = [0, 0, 0]\nedges = [[1, 0, 0]]",
+            "span an area",
+        ),
+        ("type = \"directional\"\ndirection = [0, 0, 0]", "not zero"),
+        (
+            "type = \"point\"\nposition = [0, 0, 0]\nstrength = -1",
+            "at least 0",
+        ),
+    ] {
+        let message = with(&format!("[[light]]\n{light}"));
+        assert!(
+            message.contains("light[0]") && message.contains(word),
+            "{light}: {message}"
+        );
+    }
+    for (camera, word) in [
+        ("blades = 2", "3 to 64"),
+        ("height = 2", "orthographic"),
+        ("focus_distance = 0", "above 0"),
+        ("type = \"fisheye\"", "panorama"),
+    ] {
+        let message = with(&format!("[camera]\n{camera}"));
+        assert!(
+            message.contains("camera.") && message.contains(word),
+            "{camera}: {message}"
+        );
+    }
+    let message = with("[integrator]\ntype = \"whitted\"");
+    assert!(
+        message.contains("integrator.type") && message.contains("\"path\""),
+        "{message}"
+    );
 }
 
 #[test]

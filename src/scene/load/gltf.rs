@@ -3,6 +3,8 @@
 //! All triangles of the default scene, node transforms baked in, Draco streams unpacked. The crate's accessor readers panic on data
 //! that is not there, so every accessor is checked against its buffer before it is read.
 
+mod material;
+
 use std::path::Path;
 
 use ::gltf as crate_gltf;
@@ -14,7 +16,7 @@ use glam::{Affine3A, Mat4, Vec2, Vec3};
 use serde::Deserialize as _;
 
 use super::draco::{self, Announced, Compressed};
-use super::{FileMaterial, FileTexture, LoadMeshErrorKind, LoadedFile, Parts, beside};
+use super::{LoadMeshErrorKind, LoadedFile, Parts, beside};
 use crate::surface::MeshBuilder;
 
 /// Required extensions that may be ignored: without them a texture or a light is lost, but no shape.
@@ -58,10 +60,12 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
             parts.add(name, primitive.material().index(), builder);
         }
     }
-    let parts = parts.finish(|index| {
-        let material = document.materials().nth(index)?;
-        Some(read_material(&document, &material, &buffers, path))
-    });
+    let reader = material::Reader {
+        document: &document,
+        buffers: &buffers,
+        path,
+    };
+    let parts = parts.finish(|index| reader.material(index));
     Ok(LoadedFile {
         parts,
         warnings: Vec::new(),
@@ -438,47 +442,6 @@ fn check_accessor(
         ));
     }
     Ok(())
-}
-
-fn read_material(
-    document: &Document,
-    material: &crate_gltf::Material,
-    buffers: &[Vec<u8>],
-    path: &Path,
-) -> FileMaterial {
-    let pbr = material.pbr_metallic_roughness();
-    let [r, g, b, _] = pbr.base_color_factor();
-    FileMaterial {
-        name: material.name().unwrap_or("").to_owned(),
-        base_color: Vec3::new(r, g, b),
-        base_color_texture: pbr.base_color_texture().and_then(|info| {
-            let image = info.texture().source().index();
-            read_image(document, image, buffers, path)
-        }),
-        metallic: Some(pbr.metallic_factor()),
-        roughness: Some(pbr.roughness_factor()),
-        displacement: None,
-    }
-}
-
-/// The picture, from the plain JSON: the crate's own accessor panics on an image without a source.
-fn read_image(
-    document: &Document,
-    image: usize,
-    buffers: &[Vec<u8>],
-    path: &Path,
-) -> Option<FileTexture> {
-    let image = document.as_json().images.get(image)?;
-    if let Some(uri) = &image.uri {
-        return match uri.strip_prefix("data:") {
-            Some(data) => Some(FileTexture::Embedded(base64(
-                data.split_once(";base64,")?.1,
-            )?)),
-            None => Some(FileTexture::Path(beside(path, &percent_decoded(uri)))),
-        };
-    }
-    let bytes = view_bytes(document, image.buffer_view?.value(), buffers)?;
-    Some(FileTexture::Embedded(bytes.to_vec()))
 }
 
 #[cfg(test)]

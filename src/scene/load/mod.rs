@@ -7,6 +7,7 @@
 
 mod draco;
 mod gltf;
+mod material;
 mod mtl;
 mod obj;
 mod ply;
@@ -14,11 +15,13 @@ mod ply;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use glam::Vec3;
 use thiserror::Error;
 
 use crate::ray::Aabb;
-use crate::surface::{MeshBuilder, Projection, UvTransform, Wrap};
+use crate::surface::{MeshBuilder, Projection};
+pub use material::{
+    FileColor, FileDetail, FileDisplacement, FileMaterial, FileScalar, FileTexture, FileTextureUse,
+};
 
 /// Endings of the files that [`load_mesh`] reads.
 pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
@@ -120,49 +123,6 @@ pub struct Part {
     pub mesh: MeshBuilder,
     /// The file's material, if it gives one.
     pub material: Option<FileMaterial>,
-}
-
-/// What a mesh file says of a material.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FileMaterial {
-    /// Its name, perhaps empty.
-    pub name: String,
-    /// Linear RGB; multiplies the texture.
-    pub base_color: Vec3,
-    /// Colour texture, sRGB.
-    pub base_color_texture: Option<FileTexture>,
-    /// 0 dielectric .. 1 metal, where the format says.
-    pub metallic: Option<f32>,
-    /// 0 mirror .. 1, where the format says.
-    pub roughness: Option<f32>,
-    /// The displacement map, where the format knows one (MTL).
-    pub displacement: Option<FileDisplacement>,
-}
-
-/// A texture by path or by value.
-#[derive(Clone, Debug, PartialEq)]
-pub enum FileTexture {
-    /// A picture file; not checked to exist.
-    Path(PathBuf),
-    /// The bytes of a PNG or JPEG file that the mesh file holds.
-    Embedded(Vec<u8>),
-}
-
-/// A displacement map that a mesh file names.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FileDisplacement {
-    /// The picture file; not checked to exist.
-    pub path: PathBuf,
-    /// World units per unit of height, if the file says.
-    pub scale: Option<f32>,
-    /// The height that displaces by nothing, if the file says.
-    pub midlevel: Option<f32>,
-    /// Applied to the texture coordinates.
-    pub uv: UvTransform,
-    /// If the file says.
-    pub wrap: Option<Wrap>,
-    /// `r`, `g`, `b`, `a` or `luminance`, if the file says.
-    pub channel: Option<&'static str>,
 }
 
 /// Reads a mesh file; the format goes by the ending.

@@ -1,24 +1,53 @@
 //! MTL material libraries: what prismarch can use of them.
 //!
-//! Read: `newmtl`, `Kd`, `map_Kd`, and for displacement `disp`, `map_disp`, `bump`, `map_bump`, in this order
-//! of preference. Everything else is passed over, so a fault in it does no harm.
+//! Read: colours and highlights (`Kd`, `Ks`, `Ns`, `Ke`, `Tf`, `Ni`, `d`, `Tr`, `illum`), their maps, the PBR statements
+//! of later exporters (`Pr`, `Pm`, `Pc`, `Pcr`, `norm`), and for displacement `disp`, `map_disp`, `bump`, `map_bump`, in
+//! this order of preference. Everything else is passed over, so a fault in it does no harm.
 
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::{FileDisplacement, FileMaterial, FileTexture, beside};
+use super::{
+    FileColor, FileDetail, FileDisplacement, FileMaterial, FileScalar, FileTexture, FileTextureUse,
+    beside,
+};
 use crate::surface::{UvTransform, Wrap};
 
-/// The statements that are read, with the spelling that tobj knows; exporters differ in case.
-const STATEMENTS: [(&str, &str); 7] = [
-    ("newmtl", "newmtl"),
-    ("kd", "Kd"),
-    ("map_kd", "map_Kd"),
-    ("disp", "disp"),
-    ("map_disp", "map_disp"),
-    ("bump", "bump"),
-    ("map_bump", "map_bump"),
+/// What the argument of a statement is.
+#[derive(Clone, Copy, PartialEq)]
+enum Argument {
+    Text,
+    Color,
+    Number,
+}
+
+/// The statements that are read, with the spelling that tobj knows, if it does; exporters differ in case.
+const STATEMENTS: [(&str, &str, Argument); 24] = [
+    ("newmtl", "newmtl", Argument::Text),
+    ("kd", "Kd", Argument::Color),
+    ("ks", "Ks", Argument::Color),
+    ("ke", "Ke", Argument::Color),
+    ("tf", "Tf", Argument::Color),
+    ("ns", "Ns", Argument::Number),
+    ("ni", "Ni", Argument::Number),
+    ("d", "d", Argument::Number),
+    ("tr", "Tr", Argument::Number),
+    ("illum", "illumination", Argument::Number),
+    ("pr", "Pr", Argument::Number),
+    ("pm", "Pm", Argument::Number),
+    ("pc", "Pc", Argument::Number),
+    ("pcr", "Pcr", Argument::Number),
+    ("map_kd", "map_Kd", Argument::Text),
+    ("map_ke", "map_Ke", Argument::Text),
+    ("map_d", "map_d", Argument::Text),
+    ("map_pr", "map_Pr", Argument::Text),
+    ("map_pm", "map_Pm", Argument::Text),
+    ("norm", "norm", Argument::Text),
+    ("disp", "disp", Argument::Text),
+    ("map_disp", "map_disp", Argument::Text),
+    ("bump", "bump", Argument::Text),
+    ("map_bump", "map_bump", Argument::Text),
 ];
 
 /// The text of a library with only what tobj reads without fault; complaints go to `warnings`.
@@ -28,12 +57,14 @@ pub(super) fn clean(text: &str, library: &Path, warnings: &mut Vec<String>) -> S
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let lower = word.to_ascii_lowercase();
-        let Some(&(_, statement)) = STATEMENTS.iter().find(|(name, _)| *name == lower) else {
+        let Some(&(_, statement, kind)) = STATEMENTS.iter().find(|(name, ..)| *name == lower)
+        else {
             continue;
         };
-        let argument = match statement {
-            "Kd" => color(rest),
-            _ => Some(rest.trim().to_owned()).filter(|a| !a.is_empty()),
+        let argument = match kind {
+            Argument::Color => color(rest),
+            Argument::Number => self::number(rest),
+            Argument::Text => Some(rest.trim().to_owned()).filter(|a| !a.is_empty()),
         };
         match argument {
             Some(argument) => cleaned += &format!("{statement} {argument}\n"),
@@ -45,6 +76,12 @@ pub(super) fn clean(text: &str, library: &Path, warnings: &mut Vec<String>) -> S
         }
     }
     cleaned
+}
+
+/// One number.
+fn number(text: &str) -> Option<String> {
+    let value: f32 = text.trim().parse().ok()?;
+    value.is_finite().then(|| value.to_string())
 }
 
 /// One grey value or three channels; other colour systems (`spectral`, `xyz`) are not read.
@@ -61,21 +98,74 @@ fn color(text: &str) -> Option<String> {
 }
 
 /// What a material of the library at `library` says.
+///
+/// Phong's exponent becomes the roughness whose GGX lobe is about as wide, alpha = sqrt(2 / (Ns + 2)) (Walter et al.,
+/// EGSR 2007, section 5.2), where the PBR statement Pr is missing and the material has highlights (Ks) at all.
+/// Illumination models with refraction (6, 7) are glass, tinted by Tf.
 pub(super) fn material(material: &tobj::Material, library: &Path) -> FileMaterial {
     let unknown = |name: &str| material.unknown_param.get(name);
+    let number = |name: &str| unknown(name).and_then(|x| x.parse::<f32>().ok());
+    let color = |name: &str| unknown(name).and_then(|x| <[f32; 3]>::try_from(numbers(x, 3).0).ok());
+    let map = |statement: &str| Map::parse(statement).texture(library);
     let displacement = unknown("disp")
         .or_else(|| unknown("map_disp"))
         .or(material.normal_texture.as_ref());
+    let unit = |x: f32| x.clamp(0.0, 1.0);
+    let scalar = |factor: Option<f32>, texture: Option<&String>, default: f32| FileScalar {
+        // A map without a number is taken as it is.
+        factor: unit(factor.unwrap_or(if texture.is_some() { 1.0 } else { default })),
+        texture: texture.map(|t| (map(t), Map::parse(t).channel.unwrap_or("r"))),
+    };
+    let highlight = material
+        .specular
+        .map(|ks| unit(Vec3::from(ks).element_sum() / 3.0));
+    let phong = material
+        .shininess
+        .filter(|_| highlight.is_some_and(|h| h > 0.0));
+    let from_phong = phong.map(|ns| (2.0 / (ns.max(0.0) + 2.0)).sqrt().sqrt());
+    let opacity = material.dissolve.or(number("Tr").map(|tr| 1.0 - tr));
+    let refracts = number("illumination").is_some_and(|i| i == 6.0 || i == 7.0);
+    let diffuse = material.diffuse.map_or(Vec3::ONE, Vec3::from);
+    let default = FileMaterial::default();
     FileMaterial {
         name: material.name.clone(),
-        base_color: material.diffuse.map_or(Vec3::ONE, Vec3::from),
-        base_color_texture: material
-            .diffuse_texture
-            .as_deref()
-            .map(|s| FileTexture::Path(beside(library, Map::parse(s).file))),
-        metallic: None,
-        roughness: None,
+        base_color: FileColor {
+            factor: if refracts {
+                color("Tf").map_or(Vec3::ONE, Vec3::from)
+            } else {
+                diffuse
+            },
+            texture: material.diffuse_texture.as_deref().map(map),
+        },
+        metallic: scalar(number("Pm"), unknown("map_Pm"), 0.0),
+        roughness: scalar(
+            number("Pr").or(from_phong),
+            unknown("map_Pr"),
+            if refracts { 0.0 } else { 1.0 },
+        ),
+        specular: FileScalar::constant(highlight.unwrap_or(0.5)),
+        ior: material
+            .optical_density
+            .filter(|n| (1.0..=3.0).contains(n))
+            .unwrap_or(default.ior),
+        transmission: FileScalar::constant(if refracts { 1.0 } else { 0.0 }),
+        coat: scalar(number("Pc"), None, 0.0),
+        coat_roughness: scalar(number("Pcr"), None, 0.0),
+        emission: FileColor {
+            factor: color("Ke").map_or(Vec3::ZERO, Vec3::from).max(Vec3::ZERO),
+            texture: unknown("map_Ke").map(|t| map(t)),
+        },
+        opacity: if refracts {
+            FileScalar::constant(1.0)
+        } else {
+            scalar(opacity, material.dissolve_texture.as_ref(), 1.0)
+        },
+        detail: unknown("norm").map(|t| FileDetail::NormalMap {
+            texture: map(t),
+            strength: 1.0,
+        }),
         displacement: displacement.map(|s| Map::parse(s).displacement(library)),
+        ..default
     }
 }
 
@@ -156,6 +246,15 @@ impl<'a> Map<'a> {
                 word(rest).map(|(_, rest)| rest)
             }
             _ => None,
+        }
+    }
+
+    /// As a texture of a material.
+    fn texture(&self, library: &Path) -> FileTextureUse {
+        FileTextureUse {
+            source: FileTexture::Path(beside(library, self.file)),
+            wrap: self.wrap.unwrap_or_default(),
+            uv: self.uv,
         }
     }
 
@@ -253,7 +352,7 @@ mod tests {
     #[test]
     fn unusable_statements_are_reported_and_left_out() {
         let mut warnings = Vec::new();
-        let text = "newmtl a\nKd 0.5\nKd 1 2\nkd nan 0 0\nNs oops\nmap_Kd\nMAP_DISP h.png\n";
+        let text = "newmtl a\nKd 0.5\nKd 1 2\nkd nan 0 0\nKa oops\nmap_Kd\nMAP_DISP h.png\n";
         let cleaned = clean(text, Path::new("m.mtl"), &mut warnings);
         assert_eq!(cleaned, "newmtl a\nKd 0.5 0.5 0.5\nmap_disp h.png\n");
         assert_eq!(warnings.len(), 3, "{warnings:?}");

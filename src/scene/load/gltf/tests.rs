@@ -2,6 +2,7 @@ use super::super::draco::tests::{SHEET, sheet};
 use super::super::tests::load_bytes;
 use super::super::{LoadMeshError, load_mesh};
 use super::*;
+use crate::scene::load::FileTexture;
 use crate::surface::NormalMode;
 use serde_json::{Value, json};
 
@@ -90,13 +91,13 @@ fn node_transforms_are_baked_and_v_points_up() {
     assert_eq!(part.mesh.texcoords[2], Vec2::new(1.0, 0.0));
     let material = part.material.unwrap();
     assert_eq!(material.name, "clay");
-    assert_eq!(material.base_color, Vec3::new(0.5, 0.25, 0.125));
+    assert_eq!(material.base_color.factor, Vec3::new(0.5, 0.25, 0.125));
     assert_eq!(
-        (material.metallic, material.roughness),
-        (Some(0.0), Some(0.75))
+        (material.metallic.factor, material.roughness.factor),
+        (0.0, 0.75)
     );
     assert!(
-        matches!(material.base_color_texture, Some(FileTexture::Path(p)) if p.ends_with("my color.png"))
+        matches!(material.base_color.texture.unwrap().source, FileTexture::Path(p) if p.ends_with("my color.png"))
     );
     // The node mirrors; outside is still outside.
     let (mesh, _) = part.mesh.build(NormalMode::File).unwrap();
@@ -170,7 +171,7 @@ fn accessors_outside_their_buffer_are_refused() {
         // An image without a source costs the texture, not the mesh.
         if pointer == "/images/0" {
             let material = result.unwrap().parts.remove(0).material.unwrap();
-            assert!(material.base_color_texture.is_none());
+            assert!(material.base_color.texture.is_none());
         } else {
             assert!(result.is_err(), "{pointer} = {value}");
         }

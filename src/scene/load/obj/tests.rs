@@ -197,9 +197,10 @@ fn materials_part_the_faces_and_bring_their_maps() {
     // The two rock faces share an edge, though other faces stand between them.
     assert_eq!(file.parts[0].mesh.positions.len(), 4);
     let rock = file.parts[0].material.as_ref().unwrap();
-    assert_eq!(rock.base_color, Vec3::new(0.5, 0.25, 1.0));
+    assert_eq!(rock.base_color.factor, Vec3::new(0.5, 0.25, 1.0));
     let color = folder.path().join("rock color.png");
-    assert_eq!(rock.base_color_texture, Some(FileTexture::Path(color)));
+    let texture = rock.base_color.texture.as_ref().unwrap();
+    assert_eq!(texture.source, FileTexture::Path(color));
     let map = rock.displacement.as_ref().unwrap();
     assert_eq!(map.path, folder.path().join("rock height.png"));
     assert_eq!((map.scale, map.midlevel), (Some(2.0), Some(0.5)));

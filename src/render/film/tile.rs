@@ -1,0 +1,256 @@
+//! Tiles: parts of the picture that are made independently and put together in any order.
+
+use glam::{UVec2, Vec2, Vec3};
+
+use super::filter::PixelFilter;
+use super::frame::{Frame, pixels};
+use super::pixel::Pixel;
+use super::sample::FirstHit;
+use crate::render::camera::Eye;
+use crate::render::integrator::{Integrator, RayCounts};
+use crate::render::sampler::{Dimension, Purpose, Sampler};
+use crate::scene::{Camera, Film, Projection, Window};
+
+/// All that turns a tile into pixels.
+pub struct TileRenderer<'a> {
+    camera: Eye,
+    eye: Vec3,
+    /// Depth is measured along this from the eye; from a panorama it is the distance.
+    view: Option<Vec3>,
+    filter: PixelFilter,
+    integrator: &'a dyn Integrator,
+    seed: u32,
+    clamp: Option<f32>,
+}
+
+/// What became of a tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileOutcome {
+    /// Rays traced.
+    pub rays: RayCounts,
+    /// Whether it was stopped before its end.
+    pub stopped: bool,
+}
+
+impl<'a> TileRenderer<'a> {
+    /// Pictures of `film` through `camera`.
+    pub fn new(camera: &Camera, film: &Film, integrator: &'a dyn Integrator) -> Self {
+        Self {
+            camera: Eye::new(camera, film.width, film.height),
+            eye: camera.position,
+            view: (camera.projection != Projection::Panorama)
+                .then(|| (camera.target - camera.position).normalize_or(Vec3::NEG_Z)),
+            filter: PixelFilter::new(film.filter),
+            integrator,
+            seed: film.seed,
+            clamp: film.clamp,
+        }
+    }
+
+    /// Gives every pixel of `tile` its samples of numbers below `until`. What a pixel becomes depends on nothing but the pixel.
+    /// `stop` is asked before every sample; once it says so, the tile is left as it is.
+    pub fn render(&self, tile: &mut Frame, until: u32, stop: &dyn Fn() -> bool) -> TileOutcome {
+        let mut outcome = TileOutcome {
+            rays: RayCounts::default(),
+            stopped: false,
+        };
+        for (index, place) in pixels(tile.window()).enumerate() {
+            let mut pixel = tile.pixel(index);
+            while let Some(sample) = tile.next_sample(&pixel).filter(|&next| next < until) {
+                if stop() {
+                    outcome.stopped = true;
+                    break;
+                }
+                self.sample(place, sample, &mut pixel, tile, &mut outcome.rays);
+            }
+            tile.set_pixel(index, &pixel);
+            if outcome.stopped {
+                break;
+            }
+        }
+        outcome
+    }
+
+    fn sample(
+        &self,
+        place: UVec2,
+        index: u32,
+        pixel: &mut Pixel,
+        tile: &Frame,
+        rays: &mut RayCounts,
+    ) {
+        let dimension = Dimension::new(0, Purpose::Film);
+        let sampler = Sampler::new(place, index, self.seed);
+        let placement = self.filter.place(index, sampler.point(dimension));
+        let centre = place.as_vec2() + Vec2::splat(0.5);
+        let lens = sampler.point(Dimension::new(0, Purpose::Lens));
+        let mut ray = self.camera.ray(centre + placement.offset, lens);
+        ray.key = sampler.ray_key(dimension);
+        let mut sample = self.integrator.sample(&ray, &sampler, rays);
+        sample.radiance = clamped(sample.radiance, self.clamp);
+        let depth = |hit: FirstHit| self.depth(hit.position);
+        let object = |hit: FirstHit| tile.objects().hash(hit.object);
+        pixel.add(
+            &sample,
+            placement.sign,
+            sample.first.map_or(0.0, depth),
+            sample.first.map_or(0, object),
+        );
+    }
+}
+
+impl TileRenderer<'_> {
+    fn depth(&self, position: Vec3) -> f32 {
+        let from_eye = position - self.eye;
+        self.view
+            .map_or_else(|| from_eye.length(), |view| from_eye.dot(view))
+    }
+}
+
+/// Scaled down to the largest component allowed; the hue stays.
+fn clamped(radiance: Vec3, most: Option<f32>) -> Vec3 {
+    match most {
+        Some(most) if radiance.max_element() > most && radiance.is_finite() => {
+            radiance * (most / radiance.max_element())
+        }
+        _ => radiance,
+    }
+}
+
+/// The grid of tiles over a window.
+#[derive(Clone, Copy, Debug)]
+pub struct TileGrid {
+    window: Window,
+    tile: u32,
+}
+
+impl TileGrid {
+    /// Tiles of `tile` x `tile` pixels (at least 1) over a window; those at its end are smaller.
+    pub fn new(window: Window, tile: u32) -> Self {
+        Self { window, tile }
+    }
+
+    /// Number of tiles.
+    pub fn len(&self) -> usize {
+        self.columns() * self.window.size().y.div_ceil(self.tile) as usize
+    }
+
+    /// The tile of this index: row by row from the top.
+    pub fn tile(&self, index: usize) -> Window {
+        // Both are below the number of pixels along a side, which is a u32.
+        let column = (index % self.columns()) as u32;
+        let row = (index / self.columns()) as u32;
+        let start = self.window.start + UVec2::new(column, row) * self.tile;
+        let end = start.saturating_add(UVec2::splat(self.tile));
+        Window {
+            start,
+            end: end.min(self.window.end),
+        }
+    }
+
+    fn columns(&self) -> usize {
+        self.window.size().x.div_ceil(self.tile) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ray::Ray;
+    use crate::render::film::{CameraSample, Objects};
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        for (width, height, size) in [(1, 1, 32), (33, 64, 32), (100, 7, 16), (5, 5, 1)] {
+            let window = Window {
+                start: UVec2::new(3, 10),
+                end: UVec2::new(3 + width, 10 + height),
+            };
+            let grid = TileGrid::new(window, size);
+            let mut seen = vec![0; window.pixels()];
+            for tile in (0..grid.len()).map(|i| grid.tile(i)) {
+                for pixel in pixels(tile) {
+                    seen[window.index(pixel).unwrap()] += 1;
+                }
+            }
+            assert!(seen.iter().all(|&count| count == 1));
+        }
+    }
+
+    /// Radiance 1, but NaN for a part of the rays.
+    struct Broken;
+
+    impl Integrator for Broken {
+        fn sample(&self, ray: &Ray, _: &Sampler, rays: &mut RayCounts) -> CameraSample {
+            rays.camera += 1;
+            CameraSample::background(match ray.key % 3 {
+                0 => Vec3::new(1.0, f32::NAN, 1.0),
+                1 => Vec3::new(1.0, 1.0, f32::INFINITY),
+                _ => Vec3::ONE,
+            })
+        }
+    }
+
+    fn film() -> Film {
+        Film {
+            width: 8,
+            height: 8,
+            spp: 32,
+            seed: 3,
+            ..Film::default()
+        }
+    }
+
+    #[test]
+    fn a_broken_sample_is_counted_and_never_spreads() {
+        let film = film();
+        let mut frame = Frame::new(&film, 0..32, Objects::default());
+        let outcome =
+            TileRenderer::new(&Camera::default(), &film, &Broken).render(&mut frame, 32, &|| false);
+        assert!(frame.radiance().iter().all(|&p| p == Vec3::ONE));
+        assert_eq!(outcome.rays.camera, 8 * 8 * 32);
+        assert!(frame.is_complete() && !outcome.stopped);
+        let expected = 8.0 * 8.0 * 32.0 * 2.0 / 3.0;
+        assert!((frame.dropped() as f64 / expected - 1.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_stopped_tile_goes_on_to_the_same_bits() {
+        let film = film();
+        let renderer = TileRenderer::new(&Camera::default(), &film, &Broken);
+        let mut whole = Frame::new(&film, 0..32, Objects::default());
+        let mut stopped = whole.clone();
+        renderer.render(&mut whole, 32, &|| false);
+        let mut rounds = 0;
+        while !stopped.is_complete() {
+            let left = std::cell::Cell::new(101);
+            renderer.render(&mut stopped, 32, &|| {
+                left.set(left.get() - 1);
+                left.get() == 0
+            });
+            rounds += 1;
+        }
+        assert_eq!(rounds, (8 * 8 * 32_usize).div_ceil(100));
+        assert_eq!(stopped, whole);
+    }
+
+    #[test]
+    fn depth_is_along_the_view_but_for_panoramas() {
+        let mut camera = Camera::default();
+        let aside = Vec3::new(3.0, 0.0, -4.0);
+        let depth = |camera: &Camera| TileRenderer::new(camera, &film(), &Broken).depth(aside);
+        assert_eq!(depth(&camera), 4.0);
+        camera.projection = Projection::Panorama;
+        assert_eq!(depth(&camera), 5.0);
+    }
+
+    #[test]
+    fn a_firefly_is_scaled_down_and_keeps_its_hue() {
+        let bright = Vec3::new(10.0, 20.0, 5.0);
+        assert_eq!(clamped(bright, Some(4.0)), Vec3::new(2.0, 4.0, 1.0));
+        assert_eq!(clamped(bright, Some(20.0)), bright);
+        assert_eq!(clamped(bright, None), bright);
+        assert!(!clamped(Vec3::new(f32::INFINITY, 1.0, 1.0), Some(4.0)).is_finite());
+        assert!(!clamped(Vec3::new(9.0, f32::NAN, 1.0), Some(4.0)).is_finite());
+    }
+}

@@ -1,0 +1,211 @@
+//! What all integrators share: hits made ready for shading, and rays that leave them.
+
+use glam::Vec3;
+
+use super::super::detail;
+use super::super::film::FirstHit;
+use super::super::material;
+use super::super::sampler::{Dimension, Purpose, Sampler};
+use super::super::shading::{ShadedPoint, is_outside};
+use super::super::{RenderInput, Surfaces};
+use super::bodies::Bodies;
+use crate::ray::{Cone, Ray};
+use crate::scene::Material;
+use crate::surface::SurfacePoint;
+use crate::trace::{Hit, RayOffset, Tracer};
+
+/// Most surfaces that a shadow ray is asked to pass.
+const MOST_HOLES: u32 = 64;
+
+/// The traced scene as an integrator sees it.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// Finds hits.
+    pub tracer: &'a dyn Tracer,
+    /// Tells what was hit.
+    pub surfaces: &'a dyn Surfaces,
+    materials: &'a [Material],
+    object_materials: &'a [usize],
+    offset: RayOffset,
+    /// Whether any material has holes: only then a shadow ray must look at what it meets.
+    has_holes: bool,
+    /// Of camera rays.
+    pub cone: Cone,
+}
+
+/// What a ray met.
+#[derive(Clone, Copy, Debug)]
+pub struct Met<'a> {
+    /// As the tracer reported it.
+    pub hit: Hit,
+    /// The surface there.
+    pub point: SurfacePoint,
+    /// Index of its material.
+    pub index: usize,
+    /// Its material.
+    pub material: &'a Material,
+    /// Whether the ray came from the outer side.
+    pub from_outside: bool,
+}
+
+impl<'a> Stage<'a> {
+    /// The stage of `input`.
+    pub fn new(input: &RenderInput<'a>) -> Self {
+        Self {
+            tracer: input.tracer,
+            surfaces: input.surfaces,
+            materials: input.materials,
+            object_materials: input.object_materials,
+            offset: RayOffset::for_scene(input.tracer.bounds().diagonal()),
+            has_holes: input.materials.iter().any(|m| !m.opacity.is(1.0)),
+            cone: Cone::from_eye(input.camera.pixel_spread(input.film.height)),
+        }
+    }
+
+    /// The first hit of `ray`, as the cone around it sees the surface.
+    pub fn meet(&self, ray: &Ray, cone: &Cone) -> Option<Met<'a>> {
+        let hit = self.tracer.intersect(ray)?;
+        let point = self.surfaces.seen_point(&hit, ray, cone);
+        let index = self.object_materials[self.surfaces.object(&hit)];
+        Some(Met {
+            hit,
+            point,
+            index,
+            material: &self.materials[index],
+            from_outside: is_outside(&point, -ray.direction),
+        })
+    }
+
+    /// What `ray` met, ready for shading. `eta` is the index of refraction beyond it over that before it; what is
+    /// opaque there is at least as rough as `least_alpha`.
+    pub fn shade(&self, ray: &Ray, met: &Met, eta: f32, least_alpha: f32) -> ShadedPoint {
+        let inside = !met.from_outside && met.material.is_transmissive();
+        let mut parameters = material::parameters(met.material, &met.point, eta, inside);
+        if !met.material.is_transmissive() {
+            parameters.blur(least_alpha);
+        }
+        let normal = match &met.material.detail {
+            Some(detail) => detail::normal(detail, &met.point, self.surfaces.tangents(&met.hit)),
+            None => met.point.shading_normal,
+        };
+        ShadedPoint::new(&met.point, normal, -ray.direction, parameters)
+    }
+
+    /// What the film is told of the first thing that a camera ray met.
+    pub fn first_hit(&self, met: &Met, shaded: &ShadedPoint) -> FirstHit {
+        let point = &met.point;
+        FirstHit {
+            albedo: shaded.bsdf().albedo(),
+            normal: point.shading_normal,
+            position: point.position,
+            texcoord: point.texcoord,
+            displacement: point.displacement,
+            object: self.surfaces.object(&met.hit),
+            prim: met.hit.prim,
+        }
+    }
+
+    /// A ray that leaves `point` in `direction`, on the side that this is on.
+    pub fn ray_from(&self, point: &SurfacePoint, direction: Vec3, key: u32) -> Ray {
+        Ray {
+            key,
+            ..Ray::new(self.start(point, direction), direction)
+        }
+    }
+
+    fn start(&self, point: &SurfacePoint, direction: Vec3) -> Vec3 {
+        let side = if is_outside(point, direction) {
+            1.0
+        } else {
+            -1.0
+        };
+        let normal = side * point.geometric_normal;
+        self.offset
+            .apply(point.position + point.tolerance * normal, normal)
+    }
+
+    /// The part of light that comes through along `ray`: 0 or 1 but for surfaces with holes. Glass hides what is
+    /// behind it.
+    pub fn visibility(&self, mut ray: Ray) -> f32 {
+        if !self.has_holes {
+            return if self.tracer.occluded(&ray) { 0.0 } else { 1.0 };
+        }
+        let mut part = 1.0;
+        for _ in 0..MOST_HOLES {
+            let Some(met) = self.meet(&ray, &Cone::default()) else {
+                return part;
+            };
+            part *= 1.0 - material::opacity(met.material, &met.point);
+            if part == 0.0 {
+                return 0.0;
+            }
+            ray = self.beyond(&ray, &met);
+        }
+        0.0
+    }
+
+    /// `ray` from behind what it met.
+    pub fn beyond(&self, ray: &Ray, met: &Met) -> Ray {
+        Ray {
+            origin: self.start(&met.point, ray.direction),
+            tfar: ray.tfar - met.hit.t,
+            ..*ray
+        }
+    }
+
+    /// The bodies around a point: those whose inner sides a ray from there to the outside meets.
+    pub fn bodies_at(&self, position: Vec3) -> Bodies {
+        let mut ray = Ray::new(position, Vec3::Y);
+        let mut entered = Bodies::default();
+        let mut around = Vec::new();
+        for _ in 0..MOST_HOLES {
+            let Some(met) = self.meet(&ray, &Cone::default()) else {
+                break;
+            };
+            if met.material.is_transmissive() {
+                let after = entered
+                    .cross(self.materials, met.index, met.from_outside)
+                    .beyond;
+                if after == entered {
+                    around.push(met.index);
+                }
+                entered = after;
+            }
+            ray = self.beyond(&ray, &met);
+        }
+        // The outermost was entered first.
+        let enter = |bodies: Bodies, index| bodies.cross(self.materials, index, true).beyond;
+        around.into_iter().rev().fold(Bodies::default(), enter)
+    }
+
+    /// The object whose inner side is met in all of 26 directions from `position`, if it is opaque.
+    pub fn enclosing_object(&self, position: Vec3) -> Option<usize> {
+        let steps = [-1.0, 0.0, 1.0];
+        let all = steps.map(|x| steps.map(|y| steps.map(|z| Vec3::new(x, y, z))));
+        let directions = all.into_iter().flatten().flatten();
+        let mut object = None;
+        for direction in directions.filter(|d| *d != Vec3::ZERO) {
+            // A little askew: rays along the axes of a scene graze its edges.
+            let askew = direction.normalize() + Vec3::new(0.013, 0.027, -0.019);
+            let met = self.meet(&Ray::new(position, askew.normalize()), &Cone::default())?;
+            let here = self.surfaces.object(&met.hit);
+            let shut = !met.from_outside
+                && !met.material.is_transmissive()
+                && met.material.opacity.is(1.0);
+            if !shut || object.is_some_and(|o| o != here) {
+                return None;
+            }
+            object = Some(here);
+        }
+        object
+    }
+
+    /// Whether the ray slips through a hole; the number of its surface so far keeps choices apart.
+    pub fn slips(&self, met: &Met, crossing: u32, sampler: &Sampler) -> bool {
+        if met.material.opacity.is(1.0) {
+            return false;
+        }
+        let dimension = Dimension::new(crossing, Purpose::Opacity);
+        sampler.point(dimension).x >= material::opacity(met.material, &met.point)
+    }
+}

@@ -1,0 +1,227 @@
+//! Materials of glTF 2.0, with the extensions that a principled material can follow: emissive_strength, ior,
+//! transmission, volume, specular, clearcoat, sheen (KHR_materials_*) and KHR_texture_transform.
+//!
+//! Read from the plain JSON: the crate's accessors panic on an image without a source, and know not all extensions.
+//! What is missing or of another type than it should be is as if it were not there; numbers out of range are clamped.
+
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+use serde_json::Value;
+
+use super::{Document, base64, percent_decoded, view_bytes};
+use crate::scene::load::{
+    FileColor, FileDetail, FileMaterial, FileScalar, FileTexture, FileTextureUse, beside,
+};
+use crate::surface::{UvTransform, Wrap};
+
+/// glTF's codes for wrap modes.
+const CLAMP_TO_EDGE: u64 = 33_071;
+const MIRRORED_REPEAT: u64 = 33_648;
+
+/// One material of a document.
+pub(super) struct Reader<'a> {
+    pub document: &'a Document,
+    pub buffers: &'a [Vec<u8>],
+    pub path: &'a Path,
+}
+
+impl Reader<'_> {
+    /// Material number `index`.
+    pub fn material(&self, index: usize) -> Option<FileMaterial> {
+        let json = self.document.as_json().materials.get(index)?;
+        let m = serde_json::to_value(json).ok()?;
+        let extension = |name: &str| format!("/extensions/KHR_materials_{name}");
+        let number = |at: String, default: f32| number(&m, &at, default);
+        let pbr = "/pbrMetallicRoughness";
+        let strength = number(extension("emissive_strength") + "/emissiveStrength", 1.0).max(0.0);
+        let mut emission = self.color(&m, "/emissiveFactor", "/emissiveTexture", Vec3::ZERO);
+        emission.factor *= strength;
+        let rough_metal = self.texture(&m, &format!("{pbr}/metallicRoughnessTexture"));
+        let of_rough_metal = |factor: &str, channel| FileScalar {
+            factor: number(format!("{pbr}/{factor}"), 1.0).clamp(0.0, 1.0),
+            texture: rough_metal.clone().map(|t| (t, channel)),
+        };
+        let scalar = |name: &str, factor: &str, texture: &str, channel, default: f32| {
+            let at = extension(name);
+            FileScalar {
+                factor: number(format!("{at}/{factor}"), default).clamp(0.0, 1.0),
+                texture: self
+                    .texture(&m, &format!("{at}/{texture}"))
+                    .map(|t| (t, channel)),
+            }
+        };
+        let (volume, sheen) = (extension("volume"), extension("sheen"));
+        let mut specular = scalar("specular", "specularFactor", "specularTexture", "a", 1.0);
+        // glTF's 1 is the reflectance that follows from the index; ours is 0.5.
+        specular.factor *= 0.5;
+        let distance = number(volume.clone() + "/attenuationDistance", f32::INFINITY);
+        Some(FileMaterial {
+            name: m["name"].as_str().unwrap_or("").to_owned(),
+            base_color: self.color(
+                &m,
+                &format!("{pbr}/baseColorFactor"),
+                &format!("{pbr}/baseColorTexture"),
+                Vec3::ONE,
+            ),
+            metallic: of_rough_metal("metallicFactor", "b"),
+            roughness: of_rough_metal("roughnessFactor", "g"),
+            specular,
+            ior: number(extension("ior") + "/ior", 1.5).clamp(1.0, 3.0),
+            transmission: scalar(
+                "transmission",
+                "transmissionFactor",
+                "transmissionTexture",
+                "r",
+                0.0,
+            ),
+            attenuation_color: vector(&m, &(volume + "/attenuationColor"), Vec3::ONE)
+                .clamp(Vec3::ZERO, Vec3::ONE),
+            attenuation_distance: if distance > 0.0 {
+                distance
+            } else {
+                f32::INFINITY
+            },
+            coat: scalar("clearcoat", "clearcoatFactor", "clearcoatTexture", "r", 0.0),
+            coat_roughness: scalar(
+                "clearcoat",
+                "clearcoatRoughnessFactor",
+                "clearcoatRoughnessTexture",
+                "g",
+                0.0,
+            ),
+            sheen_color: self.color(
+                &m,
+                &format!("{sheen}/sheenColorFactor"),
+                &format!("{sheen}/sheenColorTexture"),
+                Vec3::ZERO,
+            ),
+            sheen_roughness: scalar(
+                "sheen",
+                "sheenRoughnessFactor",
+                "sheenRoughnessTexture",
+                "a",
+                0.0,
+            ),
+            emission,
+            opacity: self.opacity(&m),
+            detail: self
+                .texture(&m, "/normalTexture")
+                .map(|texture| FileDetail::NormalMap {
+                    texture,
+                    strength: number("/normalTexture/scale".into(), 1.0),
+                }),
+            displacement: None,
+        })
+    }
+
+    /// The alpha of the base colour, unless the mode is OPAQUE. MASK is taken for BLEND: its edge is the texture's.
+    fn opacity(&self, m: &Value) -> FileScalar {
+        if !matches!(m["alphaMode"].as_str(), Some("MASK" | "BLEND")) {
+            return FileScalar::constant(1.0);
+        }
+        FileScalar {
+            factor: number(m, "/pbrMetallicRoughness/baseColorFactor/3", 1.0).clamp(0.0, 1.0),
+            texture: self
+                .texture(m, "/pbrMetallicRoughness/baseColorTexture")
+                .map(|t| (t, "a")),
+        }
+    }
+
+    fn color(&self, m: &Value, factor: &str, texture: &str, default: Vec3) -> FileColor {
+        FileColor {
+            factor: vector(m, factor, default).max(Vec3::ZERO),
+            texture: self.texture(m, texture),
+        }
+    }
+
+    /// The texture that the object at `pointer` refers to.
+    fn texture(&self, m: &Value, pointer: &str) -> Option<FileTextureUse> {
+        let info = m.pointer(pointer)?;
+        let root = self.document.as_json();
+        let texture = root
+            .textures
+            .get(usize::try_from(info["index"].as_u64()?).ok()?)?;
+        let sampler = texture.sampler.and_then(|s| root.samplers.get(s.value()));
+        let wrap = sampler.and_then(|s| serde_json::to_value(s).ok()?["wrapS"].as_u64());
+        Some(FileTextureUse {
+            source: self.image(texture.source.value())?,
+            wrap: match wrap {
+                Some(CLAMP_TO_EDGE) => Wrap::Clamp,
+                Some(MIRRORED_REPEAT) => Wrap::Mirror,
+                _ => Wrap::Repeat,
+            },
+            uv: uv_transform(&info["extensions"]["KHR_texture_transform"]),
+        })
+    }
+
+    fn image(&self, index: usize) -> Option<FileTexture> {
+        let image = self.document.as_json().images.get(index)?;
+        if let Some(uri) = &image.uri {
+            return match uri.strip_prefix("data:") {
+                Some(data) => Some(FileTexture::Embedded(base64(
+                    data.split_once(";base64,")?.1,
+                )?)),
+                None => Some(FileTexture::Path(beside(self.path, &percent_decoded(uri)))),
+            };
+        }
+        let bytes = view_bytes(self.document, image.buffer_view?.value(), self.buffers)?;
+        Some(FileTexture::Embedded(bytes.to_vec()))
+    }
+}
+
+/// The extension's transform, which is of coordinates with v down and turns the other way, for v up:
+/// with t = 1 - v, the offset takes up what the flip moves.
+fn uv_transform(t: &Value) -> UvTransform {
+    let pair = |key: &str, default: Vec2| {
+        let component = |i: usize, default: f32| number(&t[key], &format!("/{i}"), default);
+        Vec2::new(component(0, default.x), component(1, default.y))
+    };
+    if !t.is_object() {
+        return UvTransform::default();
+    }
+    let (offset, scale) = (pair("offset", Vec2::ZERO), pair("scale", Vec2::ONE));
+    let rotation = number(t, "/rotation", 0.0);
+    let (sin, cos) = rotation.sin_cos();
+    UvTransform {
+        scale,
+        rotation,
+        offset: Vec2::new(offset.x + sin * scale.y, 1.0 - offset.y - cos * scale.y),
+    }
+}
+
+fn number(m: &Value, pointer: &str, default: f32) -> f32 {
+    let found = m.pointer(pointer).and_then(Value::as_f64);
+    found
+        .map(|x| x as f32)
+        .filter(|x| x.is_finite())
+        .unwrap_or(default)
+}
+
+fn vector(m: &Value, pointer: &str, default: Vec3) -> Vec3 {
+    let component = |i: usize| number(m, &format!("{pointer}/{i}"), default[i]);
+    Vec3::new(component(0), component(1), component(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn texture_transforms_are_turned_upside_down() {
+        let t = json!({ "offset": [0.25, 0.5], "rotation": 0.5, "scale": [2.0, 3.0] });
+        let uv = uv_transform(&t);
+        let (sin, cos) = 0.5_f32.sin_cos();
+        for (u, v) in [(0.0, 0.0), (0.3, 0.9), (1.0, 0.2)] {
+            // KHR_texture_transform: translation * rotation * scale, counter-clockwise as seen with v down.
+            let (x, y) = (2.0 * u, 3.0 * v);
+            let expected = Vec2::new(0.25 + cos * x + sin * y, 0.5 - sin * x + cos * y);
+            let found = uv.apply(Vec2::new(u, 1.0 - v));
+            let found = Vec2::new(found.x, 1.0 - found.y);
+            assert!(found.abs_diff_eq(expected, 1e-6), "{found} {expected}");
+        }
+        assert_eq!(uv_transform(&Value::Null), UvTransform::default());
+    }
+}
