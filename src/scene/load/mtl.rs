@@ -152,7 +152,10 @@ pub(super) fn material(material: &tobj::Material, library: &Path) -> FileMateria
         coat: scalar(number("Pc"), None, 0.0),
         coat_roughness: scalar(number("Pcr"), None, 0.0),
         emission: FileColor {
-            factor: color("Ke").map_or(Vec3::ZERO, Vec3::from).max(Vec3::ZERO),
+            factor: material
+                .emissive
+                .map_or(Vec3::ZERO, Vec3::from)
+                .max(Vec3::ZERO),
             texture: unknown("map_Ke").map(|t| map(t)),
         },
         opacity: if refracts {

@@ -2,7 +2,7 @@ use super::super::draco::tests::{SHEET, sheet};
 use super::super::tests::load_bytes;
 use super::super::{LoadMeshError, load_mesh};
 use super::*;
-use crate::scene::load::FileTexture;
+use crate::scene::load::{FileDetail, FileScalar, FileTexture};
 use crate::surface::NormalMode;
 use serde_json::{Value, json};
 
@@ -286,4 +286,59 @@ fn broken_compressed_primitives_are_refused() {
 fn a_scene_without_meshes_has_no_faces() {
     let error = load(&with("/scenes/0/nodes", json!([]))).unwrap_err();
     assert!(matches!(error.kind, LoadMeshErrorKind::NoFaces));
+}
+
+#[test]
+fn extensions_of_materials_are_read() {
+    let mut document = document();
+    let texture = json!({ "index": 0 });
+    document["materials"][0] = json!({
+        "name": "gem",
+        "emissiveFactor": [1.0, 0.5, 0.0],
+        "alphaMode": "MASK",
+        "normalTexture": { "index": 0, "scale": 0.5 },
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [1.0, 1.0, 1.0, 0.75],
+            "metallicRoughnessTexture": texture,
+        },
+        "extensions": {
+            "KHR_materials_emissive_strength": { "emissiveStrength": 4.0 },
+            "KHR_materials_ior": { "ior": 1.8 },
+            "KHR_materials_transmission": { "transmissionFactor": 0.9, "transmissionTexture": texture },
+            "KHR_materials_volume": { "attenuationDistance": 0.25, "attenuationColor": [0.1, 0.2, 0.3] },
+            "KHR_materials_specular": { "specularFactor": 0.5 },
+            "KHR_materials_clearcoat": { "clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.25 },
+            "KHR_materials_sheen": { "sheenColorFactor": [0.5, 0.5, 0.5], "sheenRoughnessFactor": 0.75 },
+        },
+    });
+    let material = load(&document).unwrap().parts.remove(0).material.unwrap();
+    assert_eq!(material.emission.factor, Vec3::new(4.0, 2.0, 0.0));
+    assert_eq!((material.ior, material.attenuation_distance), (1.8, 0.25));
+    assert_eq!(material.attenuation_color, Vec3::new(0.1, 0.2, 0.3));
+    let channel = |scalar: &FileScalar| scalar.texture.as_ref().map(|t| t.1);
+    assert_eq!(
+        (
+            material.transmission.factor,
+            channel(&material.transmission)
+        ),
+        (0.9, Some("r"))
+    );
+    assert_eq!(
+        (channel(&material.roughness), channel(&material.metallic)),
+        (Some("g"), Some("b"))
+    );
+    assert_eq!(
+        (material.specular.factor, material.opacity.factor),
+        (0.25, 0.75)
+    );
+    assert_eq!(
+        (material.coat.factor, material.coat_roughness.factor),
+        (1.0, 0.25)
+    );
+    assert_eq!(material.sheen_color.factor, Vec3::splat(0.5));
+    assert_eq!(material.sheen_roughness.factor, 0.75);
+    assert!(matches!(
+        material.detail,
+        Some(FileDetail::NormalMap { strength: 0.5, .. })
+    ));
 }

@@ -210,3 +210,42 @@ fn materials_part_the_faces_and_bring_their_maps() {
     assert_eq!(map.scale, Some(0.5));
     assert!(file.parts[2].material.is_none());
 }
+
+#[test]
+fn materials_say_what_they_are_made_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = "newmtl lamp\nKd 0 0 0\nKe 4 2 1\nnewmtl shiny\nKs 0.4 0.4 0.4\nNs 30\nNi 1.6\nd 0.75\nnewmtl chalk\nKs 0 0 0\nNs 30\n\
+        newmtl pane\nKd 0.2 0.2 0.2\nTf 0.5 1 0.5\nTr 0.9\nillum 7\nnewmtl pbr\nPr 0.3\nPm 1\nPc 0.5\nmap_Pr -imfchan g rough.png\nnorm n.png\n";
+    std::fs::write(folder.path().join("m.mtl"), library).unwrap();
+    let names = ["lamp", "shiny", "chalk", "pane", "pbr"];
+    let faces: String = names
+        .iter()
+        .map(|n| format!("usemtl {n}\nf 1 2 3\n"))
+        .collect();
+    let path = folder.path().join("m.obj");
+    std::fs::write(&path, format!("mtllib m.mtl\n{SQUARE}{faces}")).unwrap();
+    let file = load_mesh(&path).unwrap();
+    let materials: Vec<_> = file
+        .parts
+        .into_iter()
+        .map(|p| p.material.unwrap())
+        .collect();
+    let [lamp, shiny, chalk, pane, pbr] = &materials[..] else {
+        panic!("five were written");
+    };
+    assert_eq!(lamp.emission.factor, Vec3::new(4.0, 2.0, 1.0));
+    // alpha = roughness^2 = sqrt(2 / 32).
+    assert!((shiny.roughness.factor - 0.5).abs() < 1e-6);
+    assert!((shiny.specular.factor - 0.4).abs() < 1e-6);
+    assert_eq!((shiny.ior, shiny.opacity.factor), (1.6, 0.75));
+    // An exponent without a highlight says nothing.
+    assert_eq!((chalk.roughness.factor, chalk.specular.factor), (1.0, 0.0));
+    assert_eq!((pane.transmission.factor, pane.opacity.factor), (1.0, 1.0));
+    assert_eq!(pane.base_color.factor, Vec3::new(0.5, 1.0, 0.5));
+    assert_eq!(
+        (pbr.roughness.factor, pbr.metallic.factor, pbr.coat.factor),
+        (0.3, 1.0, 0.5)
+    );
+    assert_eq!(pbr.roughness.texture.as_ref().unwrap().1, "g");
+    assert!(pbr.detail.is_some());
+}
