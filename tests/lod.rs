@@ -16,7 +16,7 @@ use glam::{Affine3A, Vec2, Vec3};
 use prismarch::prism::{EditBounds, Lod, March, MarchError, PrismOptions, Prisms, Step};
 use prismarch::ray::{Ray, RayPacket};
 use prismarch::render::{Picture, RenderInput, render};
-use prismarch::scene::{Camera, Color, Film, Light, Material, ToneCurve};
+use prismarch::scene::{Camera, Color, Film, Integrator, Light, Material, Scalar, ToneCurve};
 use prismarch::surface::{DisplacedSurface, TexelRect, Texels, UvTransform, Wrap};
 use prismarch::trace::{Hit, Object, Placement, Shape, Tracer, World};
 
@@ -392,14 +392,15 @@ fn picture(surface: &Arc<DisplacedSurface>, lod: Lod, spp: u32) -> Picture {
         target: Vec3::new(0.5, 0.45, 0.0),
         up: Vec3::Z,
         fov: 0.3,
+        ..Camera::default()
     };
     let film = Film {
         width: 64,
         height: 64,
         spp,
         seed: 1,
-        exposure: 0.0,
         tone: ToneCurve::Standard,
+        ..Film::default()
     };
     let placed = world(&prisms(surface, lod), Placement::World);
     placed.set_spread(camera.pixel_spread(film.height));
@@ -411,9 +412,9 @@ fn picture(surface: &Arc<DisplacedSurface>, lod: Lod, spp: u32) -> Picture {
     let rough = Material {
         name: "rough".into(),
         base_color: Color::Constant(Vec3::splat(0.5)),
-        metallic: 0.0,
-        roughness: 1.0,
-        specular: 0.0,
+        roughness: Scalar::Constant(1.0),
+        specular: Scalar::Constant(0.0),
+        ..Material::default()
     };
     let input = RenderInput {
         tracer: &*tracer,
@@ -423,6 +424,7 @@ fn picture(surface: &Arc<DisplacedSurface>, lod: Lod, spp: u32) -> Picture {
         materials: &[rough],
         object_materials: &[0],
         lights: &[sun],
+        integrator: &Integrator::Beauty,
     };
     render(&input, &|_, _| {})
 }

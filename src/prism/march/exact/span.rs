@@ -112,9 +112,12 @@ impl<'a> Walker<'a> {
         let (begin, end) = (self.arcs.ends[0][self.lane], self.arcs.ends[1][self.lane]);
         let near = (f64::from(tnear) - time) as f32;
         let far = (f64::from(tfar) - time) as f32;
+        // Hits are compared in single precision; an infinite tfar stays what it is.
+        let rounding =
+            |t: f32, from_there: f32| ((t.abs() + from_there.abs()) * f32::EPSILON).min(f32::MAX);
         self.surely = [
-            near + near.abs() * f32::EPSILON + off,
-            far - far.abs() * f32::EPSILON - off,
+            near + rounding(tnear, near) + off,
+            far - rounding(tfar, far) - off,
         ];
         // Where level of detail ends a search must not depend on the ray's interval, and so on what was met before.
         if self.problem.spread > 0.0 {
