@@ -82,11 +82,11 @@ fn newton(patch: &Patch<'_>, ray: &Ray, crossing: &Crossing) -> Option<Root> {
             && step.z.abs() <= 1e-6 * (high - low).max(1e-6 * at.z.abs())
         {
             let within = at.z >= low - (high - low) && at.z <= high + (high - low);
-            return within.then(|| Root {
+            return within.then_some(Root {
                 t: at.z,
                 u: at.x,
                 v: at.y,
-                ng: point.du.cross(point.dv),
+                ng: point.ng,
             });
         }
     }
@@ -125,6 +125,6 @@ fn bisect(patch: &Patch<'_>, ray: &Ray, crossing: &Crossing) -> Option<Root> {
         t,
         u: p.x,
         v: p.y,
-        ng: point.du.cross(point.dv),
+        ng: point.ng,
     })
 }
