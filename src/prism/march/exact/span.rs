@@ -127,8 +127,8 @@ impl<'a, L: Lanes> Walker<'a, L> {
         let unit = grid.unit();
         let per_world = f64::from(unit) / f64::from(displacement.scale);
         let [w0, dw] = curve.w;
-        let [tnear, tfar] = problem.interval;
-        let cut = problem.is_ordered() && (t0 <= f64::from(tnear) || t1 >= f64::from(tfar));
+        // Of t in single precision, as of hits: rounded, the ends still enclose all between.
+        let cut = problem.is_ordered() && !(problem.accepts(t0) && problem.accepts(t1));
         let (area0, area1, area2) = (d0.to_f32(), d1.to_f32(), d2.to_f32());
         let spread = view.spread.to_f32();
         let mut walker = Self {
