@@ -277,11 +277,7 @@ impl Prisms {
                 .normal(bu, bv)
                 .normalize_or(patch.face_normal())
                 .as_vec3(),
-            geometric_normal: point
-                .du
-                .cross(point.dv)
-                .normalize_or(patch.face_normal())
-                .as_vec3(),
+            geometric_normal: point.ng.normalize_or(patch.face_normal()).as_vec3(),
             shading_normal: normal::smooth(&patch, bu, bv).as_vec3(),
             texcoord: st0 + u * (st1 - st0) + v * (st2 - st0),
             displacement: point.displacement as f32,

@@ -30,6 +30,8 @@ pub struct PatchPoint {
     pub du: DVec3,
     /// dS/dv (v = b2).
     pub dv: DVec3,
+    /// dS/du x dS/dv, of more digits than that product: over a triangle that is tiny beside D both run along N.
+    pub ng: DVec3,
     /// D.
     pub displacement: f64,
 }
@@ -121,7 +123,7 @@ impl Patch<'_> {
     }
 
     /// S, dS/du and dS/dv at b:
-    /// dS = dP + dD N + D (dN' - N (N . dN')) / |N'| with N = N'/|N'|.
+    /// dS = dA + dD N, dA = dP + D (dN' - N (N . dN')) / |N'| with N = N'/|N'|.
     pub fn point(&self, u: f64, v: f64) -> PatchPoint {
         self.point_of(self.map.sample(self.texel(u, v)), u, v)
     }
@@ -135,14 +137,17 @@ impl Patch<'_> {
         let tangent = |i: usize| {
             let dd = self.scale * sample.gradient.dot(self.texels[i] - self.texels[0]);
             let dn = self.normals[i] - self.normals[0];
-            self.vertices[i] - self.vertices[0]
-                + dd * normal
-                + displacement * inverse_length * (dn - normal * normal.dot(dn))
+            let da = self.vertices[i] - self.vertices[0]
+                + displacement * inverse_length * (dn - normal * normal.dot(dn));
+            (da, dd)
         };
+        let ((du, rise_u), (dv, rise_v)) = (tangent(1), tangent(2));
         PatchPoint {
             position: self.base(u, v) + displacement * normal,
-            du: tangent(1),
-            dv: tangent(2),
+            du: du + rise_u * normal,
+            dv: dv + rise_v * normal,
+            // N x N is left out.
+            ng: du.cross(dv) + normal.cross(rise_u * dv - rise_v * du),
             displacement,
         }
     }
@@ -198,6 +203,7 @@ mod tests {
         let du = (patch.point(u + e, v).position - patch.point(u - e, v).position) / (2.0 * e);
         let dv = (patch.point(u, v + e).position - patch.point(u, v - e).position) / (2.0 * e);
         assert!((p.du - du).length() < 1e-8 && (p.dv - dv).length() < 1e-8);
+        assert!((p.ng - du.cross(dv)).length() < 1e-8);
         assert!((p.displacement - patch.displacement(u, v)).abs() < 1e-15);
         let x = patch.base(u, v) + 0.3 * patch.normal(u, v);
         let found = patch.project(x, 0.1, 0.1).unwrap();

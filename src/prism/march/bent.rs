@@ -170,7 +170,7 @@ impl<'a> Curve<'a> {
                 t: b.t,
                 u: b.u,
                 v: b.v,
-                ng: point.du.cross(point.dv),
+                ng: point.ng,
             })
         })
     }

@@ -43,7 +43,7 @@ impl Root {
     }
 
     /// Whether the root is on its base triangle and the ray sees it. Neighbours overlap by a hair rather than
-    /// part by one.
+    /// part by one. Where opposed normals cancel there is no N, and no surface.
     pub fn is_hit(&self, ray: &Ray) -> bool {
         const OVERLAP: f64 = 1e-6;
         let t = self.t as f32;
@@ -52,6 +52,7 @@ impl Root {
             && self.u >= -OVERLAP
             && self.v >= -OVERLAP
             && self.u + self.v <= 1.0 + OVERLAP
+            && self.ng.is_finite()
     }
 }
 
@@ -82,11 +83,11 @@ fn newton(patch: &Patch<'_>, ray: &Ray, crossing: &Crossing) -> Option<Root> {
             && step.z.abs() <= 1e-6 * (high - low).max(1e-6 * at.z.abs())
         {
             let within = at.z >= low - (high - low) && at.z <= high + (high - low);
-            return within.then(|| Root {
+            return within.then_some(Root {
                 t: at.z,
                 u: at.x,
                 v: at.y,
-                ng: point.du.cross(point.dv),
+                ng: point.ng,
             });
         }
     }
@@ -125,6 +126,6 @@ fn bisect(patch: &Patch<'_>, ray: &Ray, crossing: &Crossing) -> Option<Root> {
         t,
         u: p.x,
         v: p.y,
-        ng: point.du.cross(point.dv),
+        ng: point.ng,
     })
 }

@@ -300,7 +300,7 @@ impl<L: Lanes> Task<L> for OnSurface<'_> {
             t,
             u,
             v,
-            ng: point.du.cross(point.dv),
+            ng: point.ng,
         }
     }
 }

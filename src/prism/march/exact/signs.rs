@@ -32,9 +32,9 @@ pub struct Signs<'a, Q> {
     patience: u32,
 }
 
-/// Spans that one ray may look at in one prism, some 10^8 texels: reached only where texture coordinates repeat a map
-/// millions of times over a triangle. What is behind is not looked for, so that no ray hangs.
-const MOST_SPANS: u32 = 1 << 20;
+/// Spans that one ray may look at in one prism, some millions of texels: reached only where texture coordinates repeat a
+/// map thousands of times over a triangle. What is behind is not looked for, so that no ray hangs.
+const MOST_SPANS: u32 = 1 << 16;
 
 /// g and its derivative by s.
 struct Height {
