@@ -100,6 +100,38 @@ impl<'a> Meeting<'a> {
         })
     }
 
+    /// The ray parameter, from the anchor, at which a lane's arc begins; before all others where that is not known.
+    #[inline(always)]
+    fn begin(&self, lane: usize) -> f32 {
+        if self.found.arcs >> lane & 1 != 0 {
+            self.arcs.ends[0][lane] - self.arcs.time_off[lane]
+        } else {
+            f32::NEG_INFINITY
+        }
+    }
+
+    /// The lane among `alive` that begins first.
+    #[inline(always)]
+    fn first(&self, alive: u32) -> usize {
+        let mut best = alive.trailing_zeros() as usize;
+        let mut rest = alive & (alive - 1);
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            if self.begin(lane) < self.begin(best) {
+                best = lane;
+            }
+        }
+        best
+    }
+
+    /// Whether nothing in a lane is before ray parameter `t`.
+    #[inline(always)]
+    fn begins_behind(&self, lane: usize, t: f32) -> bool {
+        let t = (f64::from(t) - self.ray.time) as f32;
+        self.begin(lane) > t + t.abs() * f32::EPSILON
+    }
+
     /// The first crossing in a prism, or any.
     #[inline(always)]
     fn search<L: Lanes>(&self, problem: &Problem<'_>) -> Option<Found> {
@@ -129,8 +161,11 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     let mut wall: Option<PrismHit> = None;
     let mut alive = meeting.found.arcs | meeting.found.others;
     while alive != 0 {
-        let lane = alive.trailing_zeros() as usize;
-        alive &= alive - 1;
+        let lane = meeting.first(alive);
+        alive &= !(1 << lane);
+        if meeting.begins_behind(lane, interval[1]) {
+            continue;
+        }
         if let Some(found) = meeting.search::<L>(&meeting.problem(lane, interval, false)) {
             // Of two at the same t the lower base triangle, whatever the order of the lanes.
             let beats = nearest.is_none_or(|(best, of)| {

@@ -70,20 +70,13 @@ impl<L: Lanes> Sight<L> {
         let unit = L::splat(f32::EPSILON);
         let coordinate = (reach * L::splat(4.5) + (widest + deepest) * L::splat(2.0)) * unit;
         let off = widest * (coordinate * L::splat(4.5) + widest * unit * L::splat(3.0));
-        let mut areas = [[zero; 3]; 3];
-        let (mut inside, mut outside) = (L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY));
-        for k in 0..3 {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            let first = cross(at_low[i], at_low[j]);
-            let last = cross(at_high[i], at_high[j]);
-            // Twice the middle coefficient.
-            let [p, q] = [at_high[i], at_low[j]];
-            let middle = p[1].neg_mul_add(q[0], p[0].mul_add(q[1], cross(at_low[i], at_high[j])));
-            let middle = middle * L::splat(0.5);
-            inside = inside.min(first.max(last).max(middle));
-            outside = outside.max(first.min(last).min(middle));
-            areas[k] = [first, middle, last];
-        }
+        let areas = [
+            bernstein([at_low[1], at_low[2]], [at_high[1], at_high[2]]),
+            bernstein([at_low[2], at_low[0]], [at_high[2], at_high[0]]),
+            bernstein([at_low[0], at_low[1]], [at_high[0], at_high[1]]),
+        ];
+        let inside = most(areas[0]).min(most(areas[1])).min(most(areas[2]));
+        let outside = least(areas[0]).max(least(areas[1])).max(least(areas[2]));
         let counter_clockwise = !(inside + off).sign_mask();
         let clockwise = !(off - outside).sign_mask();
 
@@ -106,6 +99,24 @@ impl<L: Lanes> Sight<L> {
         };
         (sight, met)
     }
+}
+
+/// Coefficients of p(w) x q(w), p and q linear, over the range between both ends.
+#[inline(always)]
+fn bernstein<L: Lanes>([p0, q0]: [[L; 2]; 2], [p1, q1]: [[L; 2]; 2]) -> [L; 3] {
+    // Twice the middle one.
+    let middle = p1[1].neg_mul_add(q0[0], p1[0].mul_add(q0[1], cross(p0, q1)));
+    [cross(p0, q0), middle * L::splat(0.5), cross(p1, q1)]
+}
+
+#[inline(always)]
+fn most<L: Lanes>([a, b, c]: [L; 3]) -> L {
+    a.max(b).max(c)
+}
+
+#[inline(always)]
+fn least<L: Lanes>([a, b, c]: [L; 3]) -> L {
+    a.min(b).min(c)
 }
 
 #[inline(always)]

@@ -149,24 +149,19 @@ impl Arcs {
         );
         let even = least - off * L::splat(5.0) - most * L::splat(EVEN);
 
-        // Q(s) = q0 + s ((1 - s) 2 (q1 - q0) + s (q2 - q0)): below 0 up to s = -q0 over the larger of the two.
-        let (mut from, mut to) = (zero, one);
-        let mut sides = [[zero; 3]; 3];
-        for k in 0..3 {
-            let [q0, q1, q2] = sight.areas[k];
-            let q = [
-                flip.select_negative(zero - q0, q0),
-                flip.select_negative(zero - q1, q1),
-                flip.select_negative(zero - q2, q2),
-            ];
-            let (d01, d12) = (q[1] - q[0], q[1] - q[2]);
-            let d02 = q[2] - q[0];
-            let begin = (zero - (q[0] + off)).max(zero) / (d01 + d01).max(d02);
-            let end = (zero - (q[2] + off)).max(zero) / (d12 + d12).max(zero - d02);
-            from = begin.max(from);
-            to = (one - end).min(to);
-            sides[k] = q;
-        }
+        let sides = [
+            flipped(sight.areas[0], flip),
+            flipped(sight.areas[1], flip),
+            flipped(sight.areas[2], flip),
+        ];
+        let [(b0, e0), (b1, e1), (b2, e2)] = [
+            outside(sides[0], off),
+            outside(sides[1], off),
+            outside(sides[2], off),
+        ];
+        // What is no number says nothing.
+        let from = b0.max(b1.max(b2.max(zero)));
+        let to = one - e0.max(e1.max(e2.max(zero)));
         let hair = L::splat(4.0 * f32::EPSILON);
         let (from, to) = ((from - hair).max(zero), (to + hair).min(one));
         let empty = (to - from).sign_mask();
@@ -419,6 +414,29 @@ impl<L: Lanes> Shared<L> {
             rounding: magnitude * self.inverse * L::splat(ROUNDING),
         }
     }
+}
+
+/// With the other sign where the sign bit of `flip` is set.
+#[inline(always)]
+fn flipped<L: Lanes>([q0, q1, q2]: [L; 3], flip: L) -> [L; 3] {
+    let zero = L::splat(0.0);
+    [
+        flip.select_negative(zero - q0, q0),
+        flip.select_negative(zero - q1, q1),
+        flip.select_negative(zero - q2, q2),
+    ]
+}
+
+/// How far from its beginning, and from its end, a quadratic in Bernstein form is surely below -`off`:
+/// q0 + s ((1 - s) 2 (q1 - q0) + s (q2 - q0)) is up to s = -q0 over the larger of the two.
+#[inline(always)]
+fn outside<L: Lanes>([q0, q1, q2]: [L; 3], off: L) -> (L, L) {
+    let zero = L::splat(0.0);
+    let (from_begin, from_end, across) = (q1 - q0, q1 - q2, q2 - q0);
+    (
+        (zero - (q0 + off)).max(zero) / (from_begin + from_begin).max(across),
+        (zero - (q2 + off)).max(zero) / (from_end + from_end).max(zero - across),
+    )
 }
 
 #[inline(always)]

@@ -1,10 +1,10 @@
 //! The exact march: the first crossing of the ray and S, without a step.
 //!
-//! The ray's curve through a prism ([`curve`](crate::prism::curve)) is cut into spans. A span whose box in the map lies
+//! The ray's curves through the prisms of a cluster ([`curve`](crate::prism::curve)) are set up in f32 lanes ([`arcs`]) and cut into spans. A span whose box in the map lies
 //! wholly above or below the surface's range there, by the map's min/max pyramid, is done with; one that does not is cut
 //! again, until it is a few texel cells long, and then each cell is solved ([`cells`]). Fast paths are in f32 lanes and
 //! only ever *exclude*: every box, every cell is widened by a proven bound of what the f32 path may be off
-//! ([`span::Bounds`]). What is left is decided in f64 on S itself ([`signs`]): the signs of
+//! ([`arcs`]). What is left is decided in f64 on S itself ([`signs`]): the signs of
 //! g(s) = w |N'| - D at the ends of what is left say where a root is, and a bracketed Newton iteration finds it. So a spike one texel wide
 //! is found, and the number of crossings in a prism has the parity of the signs at its ends, which neighbours share.
 
@@ -14,6 +14,7 @@ mod children;
 mod explain;
 mod lod;
 mod pieces;
+mod roots;
 mod signs;
 mod span;
 mod walls;
