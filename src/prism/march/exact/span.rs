@@ -491,7 +491,8 @@ impl Span {
             reach: slope.x.max(slope.y),
             bend: 0.25 * bend.x.max(bend.y),
             height_bend: 0.25 * height_bend,
-            rounding: rounding.x.max(rounding.y) + ROUNDING * walker.base[0].max(walker.base[1]),
+            rounding: rounding.x.max(rounding.y)
+                + ROUNDING * walker.base[0].abs().max(walker.base[1].abs()),
             height_rounding,
         }
     }
