@@ -214,6 +214,56 @@ fn normals_of_triangles_tiny_beside_the_displacement() {
     }
 }
 
+/// A curve that begins a thousand times the size of a clamped map beside it, and comes back.
+#[test]
+fn clamped_maps_seen_from_far_beside_them() {
+    let mesh = MeshBuilder {
+        positions: vec![
+            vec3(0.0, 0.0, -3.074_585),
+            vec3(0.0, 1.0, 1.056_1e-5),
+            Vec3::ZERO,
+            vec3(3.846_271e-11, 3.756_124e-14, 3.756_124e-14),
+        ],
+        normals: vec![
+            vec3(-3.082_397_5, -3.074_585, -0.012_084_961),
+            vec3(5.188_226e-19, 7.758_099e-33, -7.8125),
+            vec3(1e15, 0.25, 5.459_277e-19),
+            vec3(3.756_124e-14, 8.075_089_5e-38, 0.0),
+        ],
+        texcoords: vec![
+            Vec2::splat(-3.074_585),
+            vec2(2.666_626, 1000.0),
+            Vec2::ZERO,
+            Vec2::splat(3.756_124e-14),
+        ],
+        triangles: vec![[0, 1, 2], [3, 0, 2]],
+    };
+    let mut texels = vec![1028; 64];
+    texels[..32].fill(38807);
+    for (k, texel) in [
+        (5, 18247),
+        (6, 18247),
+        (18, 21780),
+        (30, 21655),
+        (31, 21845),
+        (32, 85),
+    ] {
+        texels[k] = texel;
+    }
+    texels[19..22].fill(21845);
+    texels[33..37].copy_from_slice(&[0, 38656, 24471, 104]);
+    texels[37] = 1123;
+    texels[51..].fill(65535);
+    let map = DisplacementMap::new(8, 8, Texels::U16(texels), Wrap::Clamp).unwrap();
+    let mut scene = Scene::exact(mesh, map, -3.074_585, -3.074_585);
+    scene.options.edit_bounds = EditBounds::Range;
+    let mut rays = around(20.0, 5.0);
+    rays.push(Ray::new(vec3(-3.074_585, 0.0, 4.4375), Vec3::splat(4.4375)));
+    for prisms in scene.prisms() {
+        hits(&prisms, &rays);
+    }
+}
+
 /// Ray parameters that are above tnear in double precision and round to it.
 #[test]
 fn ray_parameters_that_round_to_zero() {

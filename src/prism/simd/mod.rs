@@ -118,6 +118,9 @@ pub(crate) trait Lanes:
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4];
 }
 
+/// At least the texels that a curve in one piece reaches from its base.
+const FAR: f64 = 65536.0;
+
 /// A displacement map as the kernels see it.
 #[derive(Clone, Copy)]
 pub(crate) struct Grid<'m> {
@@ -148,7 +151,8 @@ impl<'m> Grid<'m> {
         self.texels.kind().unit()
     }
 
-    /// Whole texel coordinates within one period of the map, or near it where it goes on for ever.
+    /// Whole texel coordinates within one period of the map, or where it goes on for ever not much further from it than
+    /// a curve reaches from its base.
     #[inline(always)]
     pub fn base(&self, base: [f64; 2]) -> [f32; 2] {
         [self.base_along(base[0], 0), self.base_along(base[1], 1)]
@@ -160,7 +164,7 @@ impl<'m> Grid<'m> {
         let folded = match self.wrap {
             Wrap::Repeat => base - n * (base / n).floor(),
             Wrap::Mirror => base - 2.0 * n * (base / (2.0 * n)).floor(),
-            Wrap::Clamp => base.clamp(-4.0 * n, 4.0 * n),
+            Wrap::Clamp => base.clamp(-FAR, n + FAR),
         };
         folded as f32
     }
