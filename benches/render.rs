@@ -1,6 +1,6 @@
 //! Samples per second, and where their time goes: `cargo bench --bench render`.
 //!
-//! The six demos under Embree, by the `beauty` and the `path` integrator. Options after `--`: `--size PIXELS` across (640;
+//! The demos under Embree, by the `beauty` and the `path` integrator. Options after `--`: `--size PIXELS` across (640;
 //! three quarters of that down), `--spp N` (4), `--map TEXELS` (as the demo has it), `--rounds N` (3), `--demo NAME`.
 //! Prints a Markdown table.
 //!

@@ -55,6 +55,7 @@ fn make(map_size: usize) -> DemoFiles {
         map_size,
         colors,
         color_size,
+        parts: Vec::new(),
         scene,
     }
 }

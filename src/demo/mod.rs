@@ -1,4 +1,4 @@
-//! Six ready scenes made by the program itself: base mesh, displacement map, colour map, scene file.
+//! Ready scenes made by the program itself: base mesh, displacement map, colour map, scene file.
 //!
 //! Everything is procedural and seeded, so that the repository stays small and every run makes the same bytes.
 
@@ -17,6 +17,7 @@ mod scatter;
 mod shape;
 mod stump;
 mod sweep;
+mod teaser;
 mod write;
 
 use crate::surface::MeshBuilder;
@@ -34,9 +35,23 @@ pub struct DemoFiles {
     pub colors: Vec<[u8; 3]>,
     /// Texels across and up of the colour map.
     pub color_size: usize,
+    /// What else is displaced in the scene.
+    pub parts: Vec<Part>,
     /// The scene file (docs/scene.md). It names `NAME.obj`, `NAME_height.png` and `NAME_color.png`, and may
     /// name a floor written as `floor.obj`.
     pub scene: String,
+}
+
+/// A further displaced mesh, written as `PART.obj` and `PART_height.png`.
+pub struct Part {
+    /// What its files are called.
+    pub name: &'static str,
+    /// The base mesh, with normals and texture coordinates.
+    pub mesh: MeshBuilder,
+    /// Heights, bottom row first, `map_size` x `map_size`, 16 bits.
+    pub heights: Vec<u16>,
+    /// Texels across and up.
+    pub map_size: usize,
 }
 
 /// One demo.
@@ -45,9 +60,9 @@ pub struct Demo {
     pub name: &'static str,
     /// One line for `--list`.
     pub title: &'static str,
-    /// Base triangles, as in the paper's table.
+    /// Base triangles of all that is displaced, as in the paper's table.
     pub triangles: usize,
-    /// Texels across and up of the displacement map at full size.
+    /// Texels across and up of the displacement map at full size (of the largest).
     pub map_size: usize,
     /// Makes it with a map of the given size (smaller ones are for tests).
     pub make: fn(map_size: usize) -> DemoFiles,
@@ -61,6 +76,8 @@ pub const DEMOS: &[Demo] = &[
     orb::DEMO,
     stump::DEMO,
     dragon::DEMO,
+    teaser::GLASS,
+    teaser::WET,
 ];
 
 /// The demo of that name.

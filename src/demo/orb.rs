@@ -42,11 +42,12 @@ fn make(map_size: usize) -> DemoFiles {
         map_size,
         colors,
         color_size: COLOR_SIZE,
+        parts: Vec::new(),
     }
 }
 
 /// The point of the unit sphere at texture coordinates `st`.
-fn direction(st: Vec2) -> Vec3 {
+pub(super) fn direction(st: Vec2) -> Vec3 {
     let (longitude, latitude) = (TAU * st.x, PI * st.y - FRAC_PI_2);
     Vec3::new(
         longitude.sin() * latitude.cos(),
@@ -55,7 +56,8 @@ fn direction(st: Vec2) -> Vec3 {
     )
 }
 
-fn mesh() -> MeshBuilder {
+/// The unit sphere.
+pub(super) fn mesh() -> MeshBuilder {
     let rings: Vec<Vec<Vec3>> = (1..UP)
         .map(|j| {
             let v = j as f32 / UP as f32;

@@ -10,7 +10,7 @@ use glam::{Vec2, Vec3};
 
 use super::cavity::Cavity;
 use super::noise::{Octaves, fbm2, fbm3, gradient3, hash, mix, next, smoothstep, unit};
-use super::paint;
+use super::paint::{self, Heights};
 use super::sweep::{Ring, Sweep};
 use super::{Demo, DemoFiles};
 use crate::surface::MeshBuilder;
@@ -48,17 +48,24 @@ const TOP: f32 = 0.995;
 const COLOR_SIZE: usize = 2048;
 
 fn make(map_size: usize) -> DemoFiles {
+    on_stage(DEMO.name, STAGE, map_size)
+}
+
+/// The stump in a demo called `name`; `stage` is the rest of its scene file: camera, film, floor and whatever stands
+/// around.
+pub(super) fn on_stage(name: &str, stage: &str, map_size: usize) -> DemoFiles {
     let trunk = Trunk::new();
     let heights = paint::heights(map_size, |st| trunk.height(st));
     let cavity = Cavity::new(&heights.texels, map_size, COLOR_SIZE, 0.004);
     let colors = paint::colors(COLOR_SIZE, |st| trunk.color(st, &cavity));
     DemoFiles {
         mesh: trunk.mesh(),
-        scene: scene(heights.scale(), heights.midlevel()),
+        scene: scene(name, stage, &heights),
         heights: heights.texels,
         map_size,
         colors,
         color_size: COLOR_SIZE,
+        parts: Vec::new(),
     }
 }
 
@@ -438,9 +445,7 @@ fn cut_color(angle: f32, r: f32, relief: f32) -> Vec3 {
     color.lerp(Vec3::new(0.04, 0.025, 0.015), hollow.max(0.8 * pith))
 }
 
-fn scene(scale: f32, midlevel: f32) -> String {
-    format!(
-        r#"[camera]
+const STAGE: &str = r#"[camera]
 position = [0.6, 2.15, 3.7]
 target = [0.0, 0.42, 0.0]
 fov = 32.0
@@ -450,29 +455,34 @@ spp = 16
 exposure = 0.6
 
 [[mesh]]
-file = "stump.obj"
-material = "wood"
-
-[mesh.displacement]
-map = "stump_height.png"
-scale = {scale}
-midlevel = {midlevel}
-
-[[mesh]]
 file = "floor.obj"
 material = "earth"
-
-[[material]]
-name = "wood"
-base_color = {{ file = "stump_color.png" }}
-roughness = 0.85
-specular = 0.3
 
 [[material]]
 name = "earth"
 base_color = [0.17, 0.15, 0.10]
 roughness = 0.7
 specular = 0.2
+"#;
+
+fn scene(name: &str, stage: &str, heights: &Heights) -> String {
+    let (scale, midlevel) = (heights.scale(), heights.midlevel());
+    format!(
+        r#"{stage}
+[[mesh]]
+file = "{name}.obj"
+material = "wood"
+
+[mesh.displacement]
+map = "{name}_height.png"
+scale = {scale}
+midlevel = {midlevel}
+
+[[material]]
+name = "wood"
+base_color = {{ file = "{name}_color.png" }}
+roughness = 0.85
+specular = 0.3
 
 [[light]]
 type = "sun"

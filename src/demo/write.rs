@@ -1,4 +1,4 @@
-//! A demo's files: base mesh, floor, maps and scene, ready to be rendered and edited.
+//! A demo's files: base meshes, floor, maps and scene, ready to be rendered and edited.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -51,6 +51,11 @@ impl Demo {
         if !files.colors.is_empty() {
             let size = files.color_size;
             write_png_rgb8(&file("_color.png"), size, size, &files.colors, &[])?;
+        }
+        for part in &files.parts {
+            write_obj(&folder.join(format!("{}.obj", part.name)), &part.mesh)?;
+            let map = folder.join(format!("{}_height.png", part.name));
+            write_png_gray16(&map, part.map_size, part.map_size, &part.heights)?;
         }
         if files.scene.contains("floor.obj") {
             write_obj(&folder.join("floor.obj"), &floor())?;

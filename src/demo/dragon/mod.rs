@@ -36,6 +36,7 @@ fn make(map_size: usize) -> DemoFiles {
         map_size,
         colors,
         color_size: COLOR_SIZE,
+        parts: Vec::new(),
     }
 }
 
