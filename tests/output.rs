@@ -379,8 +379,9 @@ fn interrupted(folder: &Folder, arguments: &str, signal: &str) -> (Option<i32>, 
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
     let begun = lines.by_ref().any(|line| line.unwrap().contains('%'));
     assert!(begun, "nothing was rendered");
-    let kill = Command::new("kill")
-        .args(["-s", signal, &child.id().to_string()])
+    // The shell's own `kill`: the program of that name is not on every system.
+    let kill = Command::new("sh")
+        .args(["-c", &format!("kill -s {signal} {}", child.id())])
         .status();
     assert!(kill.unwrap().success());
     let rest: Vec<String> = lines.map(Result::unwrap).collect();
