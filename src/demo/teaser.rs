@@ -29,6 +29,17 @@ pub const WET: Demo = Demo {
     make: on_wet_ground,
 };
 
+/// How both are rendered.
+const FILM: &str = r#"[integrator]
+type = "path"
+
+[film]
+spp = 64
+clamp = 8.0
+exposure = 0.6
+
+"#;
+
 fn behind_glass(map_size: usize) -> DemoFiles {
     let map_size_of_ball = map_size / 4;
     let ball = paint::heights(map_size_of_ball, swell);
@@ -39,15 +50,7 @@ position = [0.5, 1.0, 5.8]
 target = [0.15, 0.5, 0.0]
 fov = 26.0
 
-[integrator]
-type = "path"
-
-[film]
-spp = 64
-clamp = 8.0
-exposure = 0.6
-
-[[mesh]]
+{FILM}[[mesh]]
 file = "floor.obj"
 material = "earth"
 
@@ -113,15 +116,7 @@ position = [0.7, 0.85, 5.2]
 target = [0.0, 0.36, 0.0]
 fov = 27.0
 
-[integrator]
-type = "path"
-
-[film]
-spp = 64
-clamp = 8.0
-exposure = 0.6
-
-[[mesh]]
+{FILM}[[mesh]]
 file = "ground.obj"
 material = "wet earth"
 
