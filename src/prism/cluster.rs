@@ -1,6 +1,6 @@
 //! Eight prisms side by side: what a backend traces as one primitive.
 //!
-//! A ray is tested against all eight in one set of lanes ([`cull`](super::cull)), so that a backend's tree has an eighth of the leaves
+//! A ray is tested against all eight in one set of lanes ([`sight`](super::sight)), so that a backend's tree has an eighth of the leaves
 //! and makes a fraction of the calls. 27 floats hold a prism: corners (9), vertex normals (9), texture coordinates after
 //! the UV transform (6), the range of w = D/|N'| (2), and the base triangle's number with its flags (1): 108 bytes per base
 //! triangle. A flag for each side tells of a wall there, where seams are closed; the walls are the surface's.

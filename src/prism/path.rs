@@ -36,7 +36,7 @@ pub struct Path {
     change: Vec4,
     /// Coefficients of (Q0, Q1, Q2), of 1, s, s^2; the last lane repeats the first.
     pub areas: [Vec4; 3],
-    /// How far the prism's sides may be off in Q: see [`Path::side_margin`].
+    /// How far the prism's sides may be off in Q: see [`side_margin`].
     pub margin: Vec4,
     /// n_0, n_1 - n_0, n_2 - n_0.
     normal: [Vec4; 3],

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! A pixel is a function of its own samples, in the order of their numbers. So any tiling gives the same bits, and a frame
-//! may be put down and taken up at any sample, through a file too ([`FrameFile`]). [`merge`] puts parts together.
+//! may be put down and taken up at any sample, through a file too ([`FrameFile`]). [`merge()`] puts parts together.
 
 mod adaptive;
 mod column;
