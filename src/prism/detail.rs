@@ -7,9 +7,9 @@ use std::sync::atomic::Ordering;
 
 use glam::{DVec3, Vec3};
 
-use super::{PrismHit, Prisms, normal};
+use super::{PrismHit, Prisms};
 use crate::ray::Footprint;
-use crate::surface::{HeightSample, Patch, SurfacePoint};
+use crate::surface::{HeightSample, Patch, SurfacePoint, smooth_normal};
 
 /// Whether hits may be off by what a pixel does not show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -97,7 +97,7 @@ impl Prisms {
         let to_ray = footprint.direction * ng.dot(footprint.direction).signum();
         SurfacePoint {
             geometric_normal: turned(normal.normalize_or(ng), to_ray.normalize()),
-            shading_normal: normal::smooth_by(&patch, sample.gradient, u, v).as_vec3(),
+            shading_normal: smooth_normal::smooth_by(&patch, sample.gradient, u, v).as_vec3(),
             ..point
         }
     }
@@ -113,7 +113,7 @@ impl Prisms {
         let charts = self.charts.as_ref()?;
         let direction = footprint.direction.as_dvec3().normalize();
         let normal = patch.normal(u, v).normalize_or_zero();
-        let ([a, b, c], [to_u, to_v]) = (patch.texels, normal::dual_edges(patch));
+        let ([a, b, c], [to_u, to_v]) = (patch.texels, smooth_normal::dual_edges(patch));
         let texels =
             |along: DVec3| (to_u.dot(along) * (b - a) + to_v.dot(along) * (c - a)).length();
         // The footprint's axes on the surface: across the ray, and along it, where it is longer as the ray is flatter.

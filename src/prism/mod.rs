@@ -17,7 +17,6 @@ mod frame;
 #[allow(unsafe_code)] // SIMD stamps
 mod kernel;
 mod march;
-mod normal;
 mod path;
 mod ray_frame;
 #[cfg(test)]
@@ -260,28 +259,8 @@ impl Prisms {
         self.kernel.occluded(self, primitive, ray)
     }
 
-    /// All a shader wants to know of the point (u, v) over base triangle `prim`, or on a wall: see [`PrismHit`].
+    /// [`DisplacedSurface::point`].
     pub fn point(&self, prim: u32, u: f32, v: f32) -> SurfacePoint {
-        let triangles = self.surface.mesh().triangles().len();
-        if let Some(wall) = (prim as usize).checked_sub(triangles) {
-            return self.surface.wall_point(wall, u, v);
-        }
-        let patch = self.surface.patch(prim);
-        let (bu, bv) = (f64::from(u), f64::from(v));
-        let point = patch.point(bu, bv);
-        let [st0, st1, st2] = self.surface.mesh().corner_texcoords(prim);
-        SurfacePoint {
-            position: point.position.as_vec3(),
-            base_position: patch.base(bu, bv).as_vec3(),
-            base_normal: patch
-                .normal(bu, bv)
-                .normalize_or(patch.face_normal())
-                .as_vec3(),
-            geometric_normal: point.ng.normalize_or(patch.face_normal()).as_vec3(),
-            shading_normal: normal::smooth(&patch, bu, bv).as_vec3(),
-            texcoord: st0 + u * (st1 - st0) + v * (st2 - st0),
-            displacement: point.displacement as f32,
-            tolerance: 0.0,
-        }
+        self.surface.point(prim, u, v)
     }
 }

@@ -66,7 +66,7 @@ pub struct DisplacedSurface {
 }
 
 /// All a shader wants to know of a hit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfacePoint {
     /// S(b), or P(b) for an undisplaced mesh.
     pub position: Vec3,

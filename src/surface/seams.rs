@@ -31,7 +31,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use super::normals::weld;
 pub(crate) use charts::ChartEdges;
 
-use super::{BaseMesh, DisplacedSurface, Patch, SurfacePoint, TexelRect, Wrap};
+use super::{BaseMesh, DisplacedSurface, Interpolated, Patch, SurfacePoint, TexelRect, Wrap};
 
 /// What happens where displaced sheets part: at UV seams, hard edges and borders.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -209,6 +209,30 @@ impl<'m> Ruled<'m> {
         [other, self.patch.displacement(u, v)]
     }
 
+    /// d/dl of both heights; on a line between texels as the map's gradient has it.
+    fn slopes(&self, l: f64) -> [f64; 2] {
+        let Patch {
+            texels, map, scale, ..
+        } = &self.patch;
+        let slope = |[a, b]: [DVec2; 2]| {
+            let along = b - a;
+            scale * map.sample(a + l * along).gradient.dot(along)
+        };
+        [
+            self.other.map_or(0.0, slope),
+            slope(self.corners.map(|k| texels[k])),
+        ]
+    }
+
+    /// dV/dl and dN'/dl.
+    fn along(&self) -> [DVec3; 2] {
+        let Patch {
+            vertices, normals, ..
+        } = &self.patch;
+        let [a, b] = self.corners;
+        [vertices[b] - vertices[a], normals[b] - normals[a]]
+    }
+
     /// The unit normal of the ruled surface at w, on the solid's outer side: away from the triangle where its own sheet
     /// is the upper one, else toward it.
     pub fn outward(&self, l: f64, w: f64, own_is_higher: bool) -> DVec3 {
@@ -286,33 +310,41 @@ impl DisplacedSurface {
         Some([a, b, b])
     }
 
-    /// All a shader wants to know of a wall, `l` along its edge (0 at the edge's first corner in the triangle's order) and
-    /// `v` of the way from the other height to the triangle's own.
+    /// A wall at `l` along its edge (0 at the edge's first corner in the triangle's order) and `v` of the way from the other height
+    /// to the triangle's own.
     ///
     /// # Panics
     ///
     /// Where there is no such wall.
-    pub fn wall_point(&self, wall: usize, l: f32, v: f32) -> SurfacePoint {
+    pub(super) fn on_wall(&self, wall: usize, l: f32, v: f32) -> Interpolated {
         let wall = &self.walls[wall];
         let ruled = Ruled::new(self.patch(wall.triangle), wall);
         let (l, v) = (f64::from(l), f64::from(v));
         let [other, own] = ruled.heights(l);
         let height = other + v * (own - other);
         let normal = ruled.normal(l);
-        let w = height / normal.length().max(Patch::LEAST_NORMAL);
+        let stretch = 1.0 / normal.length().max(Patch::LEAST_NORMAL);
+        let [slope_of_other, slope_of_own] = ruled.slopes(l);
+        let rise = slope_of_other + v * (slope_of_own - slope_of_other);
+        let [along, turn] = ruled.along();
         let (b1, b2) = ruled.barycentrics(l);
         let base = ruled.patch.base(b1, b2);
-        let outward = ruled.outward(l, w, own >= other).as_vec3();
+        let outward = ruled.outward(l, height * stretch, own >= other).as_vec3();
+        let unit = stretch * normal;
         let [st0, st1, st2] = self.mesh.corner_texcoords(wall.triangle);
-        SurfacePoint {
-            position: (base + w * normal).as_vec3(),
-            base_position: base.as_vec3(),
-            base_normal: normal.normalize_or(ruled.patch.face_normal()).as_vec3(),
-            geometric_normal: outward,
-            shading_normal: outward,
-            texcoord: st0 + b1 as f32 * (st1 - st0) + b2 as f32 * (st2 - st0),
-            displacement: height as f32,
-            tolerance: 0.0,
+        Interpolated {
+            point: SurfacePoint {
+                position: (base + height * unit).as_vec3(),
+                base_position: base.as_vec3(),
+                base_normal: normal.normalize_or(ruled.patch.face_normal()).as_vec3(),
+                geometric_normal: outward,
+                shading_normal: outward,
+                texcoord: st0 + b1 as f32 * (st1 - st0) + b2 as f32 * (st2 - st0),
+                displacement: height as f32,
+                tolerance: 0.0,
+            },
+            du: (along + rise * unit + height * stretch * (turn - unit * unit.dot(turn))).as_vec3(),
+            dv: ((own - other) * unit).as_vec3(),
         }
     }
 }

@@ -188,7 +188,7 @@ fn a_point_of_a_wall_is_between_its_heights() {
             .corners()
             .map(|k| surface.mesh().corners(wall.triangle)[k]);
         for l in [0.0, 0.3, 1.0] {
-            let [bottom, top] = [0.0, 1.0].map(|v| surface.wall_point(index, l, v));
+            let [bottom, top] = [0.0, 1.0].map(|v| surface.on_wall(index, l, v).point);
             assert_eq!(bottom.position, a.lerp(b, l));
             assert_eq!(bottom.base_position, top.base_position);
             assert!((top.position.z - top.displacement).abs() < 1e-7);

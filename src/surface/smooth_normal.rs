@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::surface::Patch;
+use super::Patch;
 
 /// The paper's smooth displaced normal Ns' = Ns - Ng + N' (its equations 18 and 26), unit length: the change that
 /// the displacement makes to the flat face's normal Ng, applied to the interpolated normal Ns.

@@ -1,0 +1,15 @@
+//! What is asked of the surface beside rays, each against an f64 oracle of its own: interpolation.
+
+#[path = "../benches/common/mod.rs"]
+mod common;
+#[path = "exact/maps.rs"]
+#[allow(dead_code)] // of another program
+mod maps;
+#[path = "exact/meshes.rs"]
+#[allow(dead_code)] // of another program
+mod meshes;
+
+#[path = "queries/definition.rs"]
+mod definition;
+#[path = "queries/interpolate.rs"]
+mod interpolate;
