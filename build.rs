@@ -1,4 +1,4 @@
-//! Finds Embree, compiles `ffi/shim.c` against it and makes the Rust declarations of `ffi/shim.h`.
+//! Finds Embree, compiles `ffi/` against it and makes the Rust declarations of `ffi/shim.h`.
 //!
 //! Environment: `EMBREE_DIR` (a prefix with include/ and lib/) instead of the system's places,
 //! `EMBREE_VERSION` (3 or 4) instead of the newer one found.
@@ -20,6 +20,7 @@ mod embree {
     use std::path::{Path, PathBuf};
 
     const PREFIXES: [&str; 4] = ["/usr", "/usr/local", "/opt/homebrew", "/opt/local"];
+    const SOURCES: [&str; 2] = ["ffi/shim.c", "ffi/point_query.c"];
     const INSTALL_HINT: &str = "install Embree and libclang (Debian, Ubuntu: `apt install libembree-dev libclang-dev`), \
         or set EMBREE_DIR to a prefix that has include/embree4 or include/embree3, \
         or build without Embree: `--no-default-features --features bvh`";
@@ -36,7 +37,7 @@ mod embree {
         for variable in ["EMBREE_DIR", "EMBREE_VERSION"] {
             println!("cargo::rerun-if-env-changed={variable}");
         }
-        for file in ["ffi/shim.h", "ffi/shim.c"] {
+        for file in SOURCES.iter().chain(&["ffi/shim.h", "ffi/embree.h"]) {
             println!("cargo::rerun-if-changed={file}");
         }
         let embree = find()?;
@@ -125,7 +126,7 @@ mod embree {
     fn compile(embree: &Embree) -> Result<(), String> {
         let mut build = cc::Build::new();
         build
-            .file("ffi/shim.c")
+            .files(SOURCES)
             .include(&embree.include)
             .define("PM_EMBREE_MAJOR", embree.major.to_string().as_str())
             .std("c11")
@@ -136,7 +137,7 @@ mod embree {
             .cargo_metadata(true);
         build.try_compile("prismarch_shim").map_err(|error| {
             format!(
-                "ffi/shim.c does not compile against Embree {}: {error}",
+                "ffi/ does not compile against Embree {}: {error}",
                 embree.version
             )
         })

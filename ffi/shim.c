@@ -1,20 +1,10 @@
-/* The only code that includes Embree's headers: what differs between Embree 3 and 4 differs here. */
-#include "shim.h"
+/* Devices, geometries, scenes and rays: what differs between Embree 3 and 4 differs here. */
+#include "embree.h"
 
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-#if PM_EMBREE_MAJOR == 3
-#include <embree3/rtcore.h>
-typedef struct RTCIntersectContext query_context;
-#elif PM_EMBREE_MAJOR == 4
-#include <embree4/rtcore.h>
-typedef struct RTCRayQueryContext query_context;
-#else
-#error "PM_EMBREE_MAJOR must be 3 or 4"
-#endif
 
 _Static_assert(RTC_VERSION_MAJOR == PM_EMBREE_MAJOR, "headers of another Embree");
 _Static_assert(RTC_MAX_INSTANCE_LEVEL_COUNT >= PM_INSTANCE_LEVELS, "Embree was built without instances");
@@ -56,14 +46,6 @@ struct pm_device {
   const void *user;
   pm_error_function on_error;
   pm_memory_function on_memory;
-};
-
-struct pm_geometry {
-  RTCGeometry rtc;
-  pm_hit_test test;
-  const void *test_user;
-  pm_filter filter; /* NULL: none */
-  const void *filter_user;
 };
 
 /* Lanes ------------------------------------------------------------------------------------------- */
@@ -453,6 +435,7 @@ pm_geometry *pm_geometry_new_user(const pm_device *device, const pm_hit_test *te
   rtcSetGeometryBoundsFunction(g->rtc, on_bounds, g);
   rtcSetGeometryIntersectFunction(g->rtc, on_intersect);
   rtcSetGeometryOccludedFunction(g->rtc, on_occluded);
+  rtcSetGeometryPointQueryFunction(g->rtc, pm_on_point_query);
   return g;
 }
 
@@ -484,6 +467,7 @@ pm_geometry *pm_geometry_new_instance(const pm_device *device, pm_scene *scene, 
   pm_geometry *g = new_geometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
   if (!g)
     return NULL;
+  g->instanced = scene;
   rtcSetGeometryInstancedScene(g->rtc, (RTCScene)scene);
   rtcSetGeometryTimeStepCount(g->rtc, 1);
   rtcSetGeometryTransform(g->rtc, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, transform);

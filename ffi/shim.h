@@ -1,6 +1,6 @@
 /* What prismarch asks of Embree, in words that do not depend on Embree's version.
  *
- * This header includes nothing of Embree; shim.c is the only file that does. Every call that can fail
+ * This header includes nothing of Embree; embree.h alone does, for the files of this directory. Every call that can fail
  * reports through the device's error function, on the calling thread, before it returns.
  */
 #ifndef PRISMARCH_SHIM_H
@@ -76,6 +76,23 @@ typedef struct pm_scene_hit {
   uint32_t inst[PM_INSTANCE_LEVELS];
 } pm_scene_hit;
 
+/* A point whose nearest neighbour no further than `radius` is looked for, both in the world; `to_world` places what is
+ * asked: 4 columns of 3. */
+typedef struct pm_point_query {
+  float point[3];
+  float radius, time;
+  float to_world[12];
+} pm_point_query;
+
+/* The nearest point: in the world, but for prim, u and v. */
+typedef struct pm_closest {
+  float distance;
+  float point[3];
+  float u, v;
+  uint32_t prim, geom;
+  uint32_t inst[PM_INSTANCE_LEVELS];
+} pm_closest;
+
 /* The test of one primitive of a user geometry. Called from many threads at once; must not unwind.
  *   bounds     writes min x y z, max x y z, wide enough for any rounding in a box test.
  *   intersect  the first hit with t in (tnear, tfar); fills `hit` and returns true, or returns false.
@@ -83,13 +100,16 @@ typedef struct pm_scene_hit {
  * The same for the lanes of a packet whose bits are set in `valid`, the others hold anything; either may be NULL,
  * then lanes are asked one by one, as they are wherever there is a filter:
  *   intersect8  fills hits[i] and sets bit i of the result for every lane i that hits.
- *   occluded8   sets bit i for every lane i that is occluded. */
+ *   occluded8   sets bit i for every lane i that is occluded.
+ * May be NULL, then nothing is near the geometry:
+ *   closest     the nearest point no further than the radius; fills `found`, but for its geom and inst, and returns true. */
 typedef struct pm_hit_test {
   void (*bounds)(const void *user, uint32_t prim, float out[6]);
   bool (*intersect)(const void *user, uint32_t prim, const pm_ray *ray, pm_hit *hit);
   bool (*occluded)(const void *user, uint32_t prim, const pm_ray *ray);
   uint32_t (*intersect8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid, pm_hit hits[PM_LANES]);
   uint32_t (*occluded8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid);
+  bool (*closest)(const void *user, uint32_t prim, const pm_point_query *query, pm_closest *found);
 } pm_hit_test;
 
 /* A regular grid of width x height vertices, `stride` vertices from one row to the next: word for word RTCGrid. */
@@ -169,5 +189,8 @@ bool pm_occluded1(const pm_scene *scene, const pm_ray *ray);
 uint32_t pm_intersect8(const pm_scene *scene, const pm_ray8 *rays, uint32_t valid, bool coherent,
                        pm_scene_hit hits[PM_LANES]);
 uint32_t pm_occluded8(const pm_scene *scene, const pm_ray8 *rays, uint32_t valid, bool coherent);
+
+/* The nearest point of the user geometries, no further than `radius`. */
+bool pm_closest1(const pm_scene *scene, const float point[3], float radius, float time, pm_closest *found);
 
 #endif

@@ -1,4 +1,5 @@
-//! What is asked of the surface beside rays, each against an f64 oracle of its own: interpolation.
+//! What is asked of the surface beside rays, each against an f64 oracle of its own: interpolation,
+//! and nearest points.
 
 #[path = "../benches/common/mod.rs"]
 mod common;
@@ -9,7 +10,11 @@ mod maps;
 #[allow(dead_code)] // of another program
 mod meshes;
 
+#[path = "queries/closest.rs"]
+mod closest;
 #[path = "queries/definition.rs"]
 mod definition;
 #[path = "queries/interpolate.rs"]
 mod interpolate;
+#[path = "queries/surfaces.rs"]
+mod surfaces;

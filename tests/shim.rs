@@ -10,12 +10,13 @@ fn packets_agree_with_single_rays() {
     let program = dir.path().join("packets");
     let lib = env!("PRISMARCH_EMBREE_LIB");
     let major = env!("PRISMARCH_EMBREE").split('.').next().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_string());
     let compiled = Command::new(compiler)
         .args(["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror"])
         .arg(format!("-DPM_EMBREE_MAJOR={major}"))
         .args(["-I", env!("PRISMARCH_EMBREE_INCLUDE")])
-        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/shim/packets.c"))
+        .args(["tests/shim/packets.c", "ffi/point_query.c"].map(|file| root.join(file)))
         .arg("-o")
         .arg(&program)
         .args([&format!("-L{lib}"), &format!("-Wl,-rpath,{lib}")])

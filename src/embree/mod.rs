@@ -9,7 +9,7 @@
 //! one becomes the other by value, so nothing is changed under a ray. A scene owns its geometries and the
 //! scenes it instances, and each geometry owns what Embree reads through it.
 //!
-//! All of Embree's versions look the same from here: `ffi/shim.c` is where they differ.
+//! All of Embree's versions look the same from here: `ffi/` is where they differ.
 
 #![allow(unsafe_code)] // the C shim; each block says why it is sound
 

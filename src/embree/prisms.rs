@@ -3,6 +3,7 @@
 use super::HitTest;
 use crate::prism::{PrismHit, Prisms};
 use crate::ray::{Aabb, Ray};
+use crate::surface::{ClosestPoint, PointQuery};
 
 impl HitTest for Prisms {
     fn len(&self) -> usize {
@@ -19,5 +20,9 @@ impl HitTest for Prisms {
 
     fn occluded(&self, prim: u32, ray: &Ray) -> bool {
         self.occluded(prim, ray)
+    }
+
+    fn closest(&self, prim: u32, query: &PointQuery) -> Option<ClosestPoint> {
+        self.closest(prim, query)
     }
 }

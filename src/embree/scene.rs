@@ -9,7 +9,8 @@ use super::geometry::{Kind, count};
 use super::user::packet_to_raw;
 use super::{Device, EmbreeError, Geometry, HitTest, Instance, Prototype, sys};
 use crate::ray::{Aabb, Ray, RayPacket};
-use crate::trace::{Hit, MAX_INSTANCE_LEVELS};
+use crate::surface::PointQuery;
+use crate::trace::{Closest, Hit, MAX_INSTANCE_LEVELS};
 
 const _: () = assert!(MAX_INSTANCE_LEVELS == sys::PM_INSTANCE_LEVELS as usize);
 
@@ -354,6 +355,50 @@ impl Scene {
     pub fn occluded1(&self, ray: &Ray) -> bool {
         // SAFETY: a live, committed scene; the shim reads the ray.
         ray.is_valid() && unsafe { sys::pm_occluded1(self.raw(), &ray_to_raw(ray)) }
+    }
+
+    /// The nearest point of the user geometries, by their [`HitTest::closest`], no further than `radius` (which may be infinite); none for a
+    /// point that is not finite or a radius that is NaN or negative. Distances are the world's, under any instance.
+    ///
+    /// Embree's own triangles and grids are not looked at.
+    pub fn closest(&self, point: Vec3, radius: f32) -> Option<Closest> {
+        self.closest_at(point, radius, 0.0)
+    }
+
+    /// [`closest`](Self::closest) at a time from 0 to 1.
+    pub fn closest_at(&self, point: Vec3, radius: f32, time: f32) -> Option<Closest> {
+        if !PointQuery::new(point, radius).is_valid() {
+            return None;
+        }
+        let mut found = sys::pm_closest {
+            distance: 0.0,
+            point: [0.0; 3],
+            u: 0.0,
+            v: 0.0,
+            prim: 0,
+            geom: 0,
+            inst: [0; MAX_INSTANCE_LEVELS],
+        };
+        let point = point.to_array();
+        // SAFETY: a live, committed scene; the shim reads the point and writes what is found.
+        let any = unsafe {
+            sys::pm_closest1(
+                self.raw(),
+                point.as_ptr(),
+                radius,
+                time.clamp(0.0, 1.0),
+                &mut found,
+            )
+        };
+        any.then(|| Closest {
+            distance: found.distance,
+            point: Vec3::from_array(found.point),
+            u: found.u,
+            v: found.v,
+            prim: found.prim,
+            geom: found.geom,
+            inst: found.inst,
+        })
     }
 
     /// [`intersect1`](Self::intersect1) for every lane: none for empty ones.

@@ -8,13 +8,15 @@ use std::mem::offset_of;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
 use super::device::DeviceState;
 use super::geometry::Kind;
 use super::{Device, EmbreeError, Geometry, sys};
 use crate::prism::PrismHit;
 use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
+use crate::surface::{ClosestPoint, PointQuery};
+use crate::trace::{INVALID_ID, MAX_INSTANCE_LEVELS};
 
 /// The hit test of a set of primitives, called from many threads at once.
 ///
@@ -37,6 +39,13 @@ pub trait HitTest: Send + Sync {
     /// Whether there is any.
     fn occluded(&self, prim: u32, ray: &Ray) -> bool {
         self.intersect(prim, ray).is_some()
+    }
+
+    /// The nearest point of what `prim` holds, no further than the query's radius and within the [`bounds`](Self::bounds) as the query places them;
+    /// none where that is not known.
+    fn closest(&self, prim: u32, query: &PointQuery) -> Option<ClosestPoint> {
+        let _ = (prim, query);
+        None
     }
 
     /// [`intersect`](Self::intersect) for the lanes whose bits are set in `valid`, at least one. The other lanes may
@@ -138,6 +147,7 @@ impl<T: HitTest + 'static> Stored<T> {
         occluded: Some(Self::on_occluded),
         intersect8: Some(Self::on_intersect8),
         occluded8: Some(Self::on_occluded8),
+        closest: Some(Self::on_closest),
     };
 
     fn new(device: &Device, test: Arc<T>) -> Result<Arc<Self>, EmbreeError> {
@@ -242,6 +252,37 @@ impl<T: HitTest + 'static> Stored<T> {
         stored
             .caught(0, || stored.test.occluded8(prim, rays, valid))
             .into()
+    }
+
+    unsafe extern "C" fn on_closest(
+        user: *const c_void,
+        prim: u32,
+        query: *const sys::pm_point_query,
+        out: *mut sys::pm_closest,
+    ) -> bool {
+        // SAFETY: as in `on_intersect`.
+        let (stored, query) = unsafe { (&*user.cast::<Self>(), &*query) };
+        let query = PointQuery {
+            point: Vec3::from_array(query.point),
+            radius: query.radius,
+            time: query.time,
+            to_world: Affine3A::from_cols_array(&query.to_world),
+        };
+        let Some(found) = stored.caught(None, || stored.test.closest(prim, &query)) else {
+            return false;
+        };
+        let found = sys::pm_closest {
+            distance: found.distance,
+            point: found.point.to_array(),
+            u: found.u,
+            v: found.v,
+            prim: found.prim,
+            geom: INVALID_ID,
+            inst: [INVALID_ID; MAX_INSTANCE_LEVELS],
+        };
+        // SAFETY: the shim's pointer is valid for a write.
+        unsafe { out.write(found) };
+        true
     }
 }
 

@@ -35,7 +35,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64};
 use glam::{DVec3, Vec3};
 
 use crate::ray::{Aabb, Ray};
-use crate::surface::{ChartEdges, DisplacedSurface, Seams, SurfacePoint};
+use crate::surface::{ChartEdges, ClosestPoint, DisplacedSurface, PointQuery, Seams, SurfacePoint};
 use exact::ExactPrisms;
 use kernel::Kernel;
 use uniform::UniformPrisms;
@@ -257,6 +257,19 @@ impl Prisms {
     #[inline]
     pub fn occluded(&self, primitive: u32, ray: &Ray) -> bool {
         self.kernel.occluded(self, primitive, ray)
+    }
+
+    /// [`DisplacedSurface::closest`] of what one traced primitive holds of the surface: its up to eight base triangles.
+    pub fn closest(&self, primitive: u32, query: &PointQuery) -> Option<ClosestPoint> {
+        match &self.parts {
+            Parts::Exact(exact) => {
+                let cluster = &exact.clusters[primitive as usize];
+                let lanes = 0..exact.len(primitive as usize);
+                self.surface
+                    .closest(lanes.map(|lane| cluster.prim(lane)), query)
+            }
+            Parts::Uniform(_) => self.surface.closest([primitive], query),
+        }
     }
 
     /// [`DisplacedSurface::point`].

@@ -10,6 +10,7 @@
 //!
 //! This room knows no prism, no Embree, no picture and no thread pool.
 
+mod closest;
 mod displaced;
 mod edit;
 mod footprint;
@@ -27,6 +28,7 @@ pub(crate) mod smooth_normal;
 mod texels;
 mod uv;
 
+pub use closest::{ClosestPoint, PointQuery};
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
 pub use edit::{TexelRect, Update};
 pub use grid::HeightSample;

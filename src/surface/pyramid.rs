@@ -18,6 +18,7 @@
 //! The pairs take 2/16 of the map's bytes on the finest level and 1/6 in all, at most 20 % for maps of at least
 //! 64x64 texels.
 
+mod around;
 mod axis;
 mod build;
 mod entries;

@@ -37,6 +37,25 @@ pub struct Hit {
     pub ng: Vec3,
 }
 
+/// The nearest point of a scene, as Embree's point query reports where it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closest {
+    /// From the point that was asked about, world units.
+    pub distance: f32,
+    /// World space.
+    pub point: Vec3,
+    /// Barycentric coordinate of vertex 1.
+    pub u: f32,
+    /// Barycentric coordinate of vertex 2.
+    pub v: f32,
+    /// Base triangle.
+    pub prim: u32,
+    /// As [`Hit::geom`].
+    pub geom: u32,
+    /// As [`Hit::inst`].
+    pub inst: [u32; MAX_INSTANCE_LEVELS],
+}
+
 impl Hit {
     /// Index into [`World::top_level`].
     pub fn top(&self) -> u32 {

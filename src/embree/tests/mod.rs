@@ -1,5 +1,6 @@
 //! Laws of the wrapper, held against hit tests with known answers.
 
+mod closest;
 mod device;
 mod edit;
 mod faults;

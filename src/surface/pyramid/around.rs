@@ -1,0 +1,129 @@
+//! The range of heights in a box of texel coordinates, in a few look-ups.
+
+use glam::DVec2;
+
+use crate::surface::{DisplacementMap, Wrap};
+
+/// Texels of slack around a box, against rounding of whoever samples.
+const SLACK: f64 = 0.01;
+
+/// Boxes up to this side are looked up texel by texel.
+const SMALL: f64 = 2.0;
+
+impl DisplacementMap {
+    /// Smallest and largest height that samples in the box from `low` to `high` (texel coordinates) can have; of a box of more than
+    /// [`SMALL`] texels that of blocks around it, which reach less than the box's longest side too far.
+    pub(crate) fn range_in_box(&self, low: DVec2, high: DVec2) -> (f32, f32) {
+        let (low, high) = (low - SLACK, high + SLACK);
+        let side = (high - low).max_element();
+        if side <= SMALL {
+            self.range_of_texels(low.floor(), high.floor() + 1.0)
+        } else {
+            self.range_of_blocks(low, high, 0.5 * side)
+        }
+    }
+
+    fn range_of_texels(&self, first: DVec2, last: DVec2) -> (f32, f32) {
+        let mut range = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut at = first;
+        while at.y <= last.y {
+            while at.x <= last.x {
+                let height = self.sample(at).height as f32;
+                range = (range.0.min(height), range.1.max(height));
+                at.x += 1.0;
+            }
+            at = DVec2::new(first.x, at.y + 1.0);
+        }
+        range
+    }
+
+    /// Four entries, each for a quarter of the box with sides up to `side`.
+    fn range_of_blocks(&self, low: DVec2, high: DVec2, side: f64) -> (f32, f32) {
+        let levels = self.pyramid.levels();
+        let finest = levels[0].shift();
+        let wanted = if side.is_finite() {
+            side.log2().ceil().max(0.0) as u32
+        } else {
+            u32::MAX
+        };
+        let level = &levels[(wanted.saturating_sub(finest) as usize).min(levels.len() - 1)];
+        let (width, height) = self.size();
+        let middle = 0.5 * (low + high);
+        let block = |low: f64, high: f64, n: usize, blocks: usize| {
+            let first = anchor(self.wrap(), low, high, n as f64);
+            (first as usize >> level.shift()).min(blocks - 1)
+        };
+        let columns = [(low.x, middle.x), (middle.x, high.x)];
+        let rows = [(low.y, middle.y), (middle.y, high.y)];
+        let is = columns.map(|(a, b)| block(a, b, width, level.width()));
+        let js = rows.map(|(a, b)| block(a, b, height, level.height()));
+        let mut range = (f32::INFINITY, f32::NEG_INFINITY);
+        for j in js {
+            for i in is {
+                let (low, high) = level.get(i, j);
+                range = (range.0.min(low), range.1.max(high));
+            }
+        }
+        (range.0 / self.unit(), range.1 / self.unit())
+    }
+}
+
+/// Where the entry is looked up that holds low..=high: see the [room's text](super).
+fn anchor(wrap: Wrap, low: f64, high: f64, n: f64) -> f64 {
+    let (first, turned) = wrap.fold(low, n);
+    match wrap {
+        Wrap::Repeat | Wrap::Clamp => first,
+        Wrap::Mirror => {
+            let (last, straight) = wrap.fold(high, n);
+            if turned < 0.0 && straight > 0.0 {
+                0.0
+            } else {
+                first.min(last)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::Texels;
+
+    #[test]
+    fn boxes_hold_all_that_is_sampled_in_them() {
+        let mut state = 1u64;
+        let mut number = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
+            (state >> 33) as f64 / (1u64 << 31) as f64
+        };
+        for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+            for (width, height) in [(1, 1), (3, 7), (16, 16), (37, 50), (100, 9)] {
+                let texels = (0..width * height).map(|_| (number() * 65535.0) as u16);
+                let texels = Texels::U16(texels.collect());
+                let map = DisplacementMap::new(width, height, texels, wrap).unwrap();
+                for _ in 0..400 {
+                    let low = 400.0 * DVec2::new(number() - 0.5, number() - 0.5);
+                    let size = 10f64.powf(3.0 * number() - 1.0) * DVec2::new(number(), number());
+                    let (least, most) = map.range_in_box(low, low + size);
+                    for _ in 0..40 {
+                        let at = low + size * DVec2::new(number(), number());
+                        let found = map.sample(at).height as f32;
+                        let held = found >= least - 1e-6 && found <= most + 1e-6;
+                        assert!(held, "{wrap:?} {width}x{height} {low} {size} {at}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_are_not_much_too_wide() {
+        let mut texels = vec![0.0; 256 * 256];
+        texels[128 * 256 + 128] = 1.0;
+        let map = DisplacementMap::new(256, 256, Texels::F32(texels), Wrap::Repeat).unwrap();
+        let around =
+            |x: f64, side: f64| map.range_in_box(DVec2::splat(x), DVec2::splat(x + side)).1;
+        assert_eq!([around(126.5, 1.9), around(124.0, 1.9)], [1.0, 0.0]);
+        assert_eq!([around(100.0, 40.0), around(60.0, 30.0)], [1.0, 0.0]);
+    }
+}
