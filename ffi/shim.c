@@ -319,7 +319,7 @@ static void on_occluded(const struct RTCOccludedFunctionNArguments *args) {
 static void on_bounds(const struct RTCBoundsFunctionArguments *args) {
   const struct pm_geometry *g = args->geometryUserPtr;
   float box[6];
-  g->test.bounds(g->test_user, args->primID, box);
+  g->test.bounds(g->test_user, args->primID, args->timeStep, box);
   struct RTCBounds *out = args->bounds_o;
   out->lower_x = box[0], out->lower_y = box[1], out->lower_z = box[2];
   out->upper_x = box[3], out->upper_y = box[4], out->upper_z = box[5];
@@ -426,11 +426,11 @@ static pm_geometry *new_geometry(const pm_device *device, enum RTCGeometryType t
 }
 
 pm_geometry *pm_geometry_new_user(const pm_device *device, const pm_hit_test *test, const void *user,
-                                  uint32_t primitives) {
+                                  uint32_t primitives, uint32_t time_steps) {
   pm_geometry *g = new_geometry(device, RTC_GEOMETRY_TYPE_USER);
   if (!g)
     return NULL;
-  pm_geometry_set_test(g, test, user, primitives);
+  pm_geometry_set_test(g, test, user, primitives, time_steps);
   /* The user pointer given here is ignored by Embree: the geometry's is what arrives. */
   rtcSetGeometryBoundsFunction(g->rtc, on_bounds, g);
   rtcSetGeometryIntersectFunction(g->rtc, on_intersect);
@@ -479,10 +479,12 @@ void pm_geometry_free(pm_geometry *g) {
   free(g);
 }
 
-void pm_geometry_set_test(pm_geometry *g, const pm_hit_test *test, const void *user, uint32_t primitives) {
+void pm_geometry_set_test(pm_geometry *g, const pm_hit_test *test, const void *user, uint32_t primitives,
+                          uint32_t time_steps) {
   g->test = *test;
   g->test_user = user;
   rtcSetGeometryUserPrimitiveCount(g->rtc, primitives);
+  rtcSetGeometryTimeStepCount(g->rtc, time_steps);
 }
 
 void pm_geometry_set_mask(pm_geometry *g, uint32_t mask) { rtcSetGeometryMask(g->rtc, mask); }

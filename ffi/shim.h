@@ -94,7 +94,8 @@ typedef struct pm_closest {
 } pm_closest;
 
 /* The test of one primitive of a user geometry. Called from many threads at once; must not unwind.
- *   bounds     writes min x y z, max x y z, wide enough for any rounding in a box test.
+ *   bounds     writes min x y z, max x y z at a time step, wide enough for any rounding in a box test; between two steps
+ *              what is hit lies in the linear interpolation of both boxes.
  *   intersect  the first hit with t in (tnear, tfar); fills `hit` and returns true, or returns false.
  *   occluded   whether there is one.
  * The same for the lanes of a packet whose bits are set in `valid`, the others hold anything; either may be NULL,
@@ -104,7 +105,7 @@ typedef struct pm_closest {
  * May be NULL, then nothing is near the geometry:
  *   closest     the nearest point no further than the radius; fills `found`, but for its geom and inst, and returns true. */
 typedef struct pm_hit_test {
-  void (*bounds)(const void *user, uint32_t prim, float out[6]);
+  void (*bounds)(const void *user, uint32_t prim, uint32_t step, float out[6]);
   bool (*intersect)(const void *user, uint32_t prim, const pm_ray *ray, pm_hit *hit);
   bool (*occluded)(const void *user, uint32_t prim, const pm_ray *ray);
   uint32_t (*intersect8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid, pm_hit hits[PM_LANES]);
@@ -145,10 +146,10 @@ bool pm_device_has_filters(const pm_device *device);
 
 /* Geometry ---------------------------------------------------------------------------------------- */
 
-/* All return NULL on failure. A new geometry is seen by every ray (mask of all bits).
+/* Time steps are evenly spaced over the times [0, 1]; 1 for what stands still. All return NULL on failure. A new geometry is seen by every ray (mask of all bits).
  * A geometry must be freed after the scenes it was attached to: Embree calls it until then. */
 pm_geometry *pm_geometry_new_user(const pm_device *device, const pm_hit_test *test, const void *user,
-                                  uint32_t primitives);
+                                  uint32_t primitives, uint32_t time_steps);
 /* Both arrays are shared, not copied: vertices as x y z with 4 readable bytes after the last one. */
 pm_geometry *pm_geometry_new_triangles(const pm_device *device, const float *vertices, uint32_t vertex_count,
                                        const uint32_t *indices, uint32_t triangle_count);
@@ -160,7 +161,8 @@ pm_geometry *pm_geometry_new_instance(const pm_device *device, pm_scene *scene, 
 void pm_geometry_free(pm_geometry *geometry);
 
 /* Another test for a user geometry. */
-void pm_geometry_set_test(pm_geometry *geometry, const pm_hit_test *test, const void *user, uint32_t primitives);
+void pm_geometry_set_test(pm_geometry *geometry, const pm_hit_test *test, const void *user, uint32_t primitives,
+                          uint32_t time_steps);
 /* The vertices of triangles or grids have moved, perhaps to another array of the same length. */
 void pm_geometry_set_vertices(pm_geometry *geometry, const float *vertices, uint32_t vertex_count);
 void pm_geometry_set_mask(pm_geometry *geometry, uint32_t mask);

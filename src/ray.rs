@@ -21,6 +21,8 @@ pub struct Ray {
     pub tnear: f32,
     /// End of the open parameter interval; may be infinite.
     pub tfar: f32,
+    /// 0 to 1, for what moves; beyond that it counts as the nearer end, and NaN as 0.
+    pub time: f32,
     /// A geometry is seen when `mask & geometry.mask != 0`.
     pub mask: u32,
     /// Random key of this ray: two rays with the same key march with the same thin-feature jitter.
@@ -36,6 +38,7 @@ impl Ray {
             direction,
             tnear: 0.0,
             tfar: f32::INFINITY,
+            time: 0.0,
             mask: u32::MAX,
             key: 0,
         }
@@ -44,6 +47,13 @@ impl Ray {
     /// The point at parameter `t`.
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + t * self.direction
+    }
+
+    /// The time as it counts: from 0 to 1.
+    #[inline(always)]
+    pub fn time_within(&self) -> f32 {
+        // Not clamp: NaN becomes 0.
+        self.time.max(0.0).min(1.0)
     }
 
     /// False for a zero, NaN or infinite direction, a NaN or infinite origin, or a NaN interval: no

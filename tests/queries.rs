@@ -1,5 +1,6 @@
 //! What is asked of the surface beside rays, each against an f64 oracle of its own: interpolation,
-//! and nearest points.
+//! nearest points, and
+//! surfaces that move.
 
 #[path = "../benches/common/mod.rs"]
 mod common;
@@ -16,5 +17,7 @@ mod closest;
 mod definition;
 #[path = "queries/interpolate.rs"]
 mod interpolate;
+#[path = "queries/motion.rs"]
+mod motion;
 #[path = "queries/surfaces.rs"]
 mod surfaces;

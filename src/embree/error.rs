@@ -83,6 +83,9 @@ pub enum EmbreeError {
         /// The panic's message.
         message: String,
     },
+    /// A hit test with no time step at all.
+    #[error("a hit test has 0 time steps; expected at least 1")]
+    NoTimeSteps,
     /// A box that is NaN, inverted or too large: Embree would drop the primitive silently.
     #[error(
         "the bounds of primitive {prim} are {min} .. {max}; expected ordered numbers below 1.8e18"

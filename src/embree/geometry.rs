@@ -111,3 +111,17 @@ pub(super) fn count(what: &'static str, found: usize) -> Result<u32, EmbreeError
         }),
     }
 }
+
+/// A number of time steps: at least 1, and no more than Embree knows.
+pub(super) fn time_steps(found: usize) -> Result<u32, EmbreeError> {
+    const MAX: usize = crate::surface::MovingSurface::MAX_TIME_STEPS;
+    match u32::try_from(found) {
+        Ok(0) => Err(EmbreeError::NoTimeSteps),
+        Ok(n) if found <= MAX => Ok(n),
+        _ => Err(EmbreeError::TooMany {
+            what: "time steps",
+            found,
+            max: MAX,
+        }),
+    }
+}

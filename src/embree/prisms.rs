@@ -1,7 +1,7 @@
 //! Prisms as Embree's user geometry.
 
 use super::HitTest;
-use crate::prism::{PrismHit, Prisms};
+use crate::prism::{MovingPrisms, PrismHit, Prisms};
 use crate::ray::{Aabb, Ray};
 use crate::surface::{ClosestPoint, PointQuery};
 
@@ -12,6 +12,36 @@ impl HitTest for Prisms {
 
     fn bounds(&self, prim: u32) -> Aabb {
         self.bounds(prim)
+    }
+
+    fn intersect(&self, prim: u32, ray: &Ray) -> Option<PrismHit> {
+        self.intersect(prim, ray)
+    }
+
+    fn occluded(&self, prim: u32, ray: &Ray) -> bool {
+        self.occluded(prim, ray)
+    }
+
+    fn closest(&self, prim: u32, query: &PointQuery) -> Option<ClosestPoint> {
+        self.closest(prim, query)
+    }
+}
+
+impl HitTest for MovingPrisms {
+    fn len(&self) -> usize {
+        self.len()
+    }
+
+    fn bounds(&self, prim: u32) -> Aabb {
+        self.bounds(prim, 0)
+    }
+
+    fn time_steps(&self) -> usize {
+        self.time_steps()
+    }
+
+    fn bounds_at(&self, prim: u32, step: usize) -> Aabb {
+        self.bounds(prim, step)
     }
 
     fn intersect(&self, prim: u32, ray: &Ray) -> Option<PrismHit> {

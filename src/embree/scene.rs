@@ -365,7 +365,7 @@ impl Scene {
         self.closest_at(point, radius, 0.0)
     }
 
-    /// [`closest`](Self::closest) at a time from 0 to 1.
+    /// [`closest`](Self::closest) at a time from 0 to 1, as [`Ray::time`].
     pub fn closest_at(&self, point: Vec3, radius: f32, time: f32) -> Option<Closest> {
         if !PointQuery::new(point, radius).is_valid() {
             return None;
@@ -386,7 +386,7 @@ impl Scene {
                 self.raw(),
                 point.as_ptr(),
                 radius,
-                time.clamp(0.0, 1.0),
+                time.max(0.0).min(1.0),
                 &mut found,
             )
         };
@@ -456,7 +456,7 @@ fn ray_to_raw(ray: &Ray) -> sys::pm_ray {
         org: ray.origin.to_array(),
         tnear: ray.tnear,
         dir: ray.direction.to_array(),
-        time: 0.0,
+        time: ray.time_within(),
         tfar: ray.tfar,
         mask: ray.mask,
         id: ray.key,

@@ -30,8 +30,19 @@ pub trait HitTest: Send + Sync {
         self.len() == 0
     }
 
-    /// A box that holds every hit on `prim`; it is padded against rounding by the caller.
+    /// A box that holds every hit on `prim`; it is padded against rounding by the caller. Of what moves the box at the first time step.
     fn bounds(&self, prim: u32) -> Aabb;
+
+    /// Time steps, evenly spaced over the times [0, 1]; 1 for what stands still, at most 129.
+    fn time_steps(&self) -> usize {
+        1
+    }
+
+    /// [`bounds`](Self::bounds) at a time step. Between two steps hits must be in the linear interpolation of both boxes.
+    fn bounds_at(&self, prim: u32, step: usize) -> Aabb {
+        let _ = step;
+        self.bounds(prim)
+    }
 
     /// The first hit with t in (tnear, tfar), along the unnormalised direction.
     fn intersect(&self, prim: u32, ray: &Ray) -> Option<PrismHit>;
@@ -96,6 +107,7 @@ impl UserGeometry {
                     &Stored::<T>::CALLBACKS,
                     Arc::as_ptr(&stored).cast(),
                     stored.primitives,
+                    stored.time_steps,
                 )
             })
         };
@@ -118,6 +130,7 @@ impl Geometry {
                 &Stored::<T>::CALLBACKS,
                 Arc::as_ptr(&stored).cast(),
                 stored.primitives,
+                stored.time_steps,
             );
         });
         // Also on an error: the shim holds the new pointers already.
@@ -131,6 +144,7 @@ struct Stored<T> {
     test: Arc<T>,
     state: Arc<DeviceState>,
     primitives: u32,
+    time_steps: u32,
 }
 
 /// Ulps of the largest coordinate by which boxes grow: Embree's box test rounds a handful of times, and its
@@ -152,10 +166,12 @@ impl<T: HitTest + 'static> Stored<T> {
 
     fn new(device: &Device, test: Arc<T>) -> Result<Arc<Self>, EmbreeError> {
         let primitives = super::geometry::count("primitives", test.len())?;
+        let time_steps = super::geometry::time_steps(test.time_steps())?;
         Ok(Arc::new(Self {
             test,
             state: device.state().clone(),
             primitives,
+            time_steps,
         }))
     }
 
@@ -167,8 +183,8 @@ impl<T: HitTest + 'static> Stored<T> {
         })
     }
 
-    fn checked_bounds(&self, prim: u32) -> Aabb {
-        let found = self.test.bounds(prim);
+    fn checked_bounds(&self, prim: u32, step: u32) -> Aabb {
+        let found = self.test.bounds_at(prim, step as usize);
         let bounds = found.padded(PADDING_ULPS);
         let reach = bounds.min.abs().max(bounds.max.abs());
         if bounds.is_valid() && reach.cmple(Vec3::splat(LARGEST_COORDINATE)).all() {
@@ -182,10 +198,10 @@ impl<T: HitTest + 'static> Stored<T> {
         Aabb::EMPTY
     }
 
-    unsafe extern "C" fn on_bounds(user: *const c_void, prim: u32, out: *mut f32) {
+    unsafe extern "C" fn on_bounds(user: *const c_void, prim: u32, step: u32, out: *mut f32) {
         // SAFETY: `user` is the Stored<T> given with CALLBACKS; `out` has room for six floats.
         let (stored, out) = unsafe { (&*user.cast::<Self>(), &mut *out.cast::<[f32; 6]>()) };
-        let bounds = stored.caught(Aabb::EMPTY, || stored.checked_bounds(prim));
+        let bounds = stored.caught(Aabb::EMPTY, || stored.checked_bounds(prim, step));
         out[..3].copy_from_slice(&bounds.min.to_array());
         out[3..].copy_from_slice(&bounds.max.to_array());
     }
@@ -326,6 +342,7 @@ pub(super) fn ray_from_raw(ray: &sys::pm_ray) -> Ray {
         direction: Vec3::from_array(ray.dir),
         tnear: ray.tnear,
         tfar: ray.tfar,
+        time: ray.time,
         mask: ray.mask,
         key: ray.id,
     }

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use glam::{DVec2, DVec3};
 
 use super::simd::{LANES, Lanes, Quad};
-use crate::surface::{DisplacedSurface, DisplacementMap, Patch};
+use crate::surface::{Corners as TriangleCorners, DisplacedSurface, DisplacementMap, Patch};
 
 /// Up to eight prisms; lanes that are not used repeat the first.
 #[repr(C, align(32))]
@@ -72,21 +72,11 @@ impl Cluster {
             let (v, n) = (mesh.corners(prim), mesh.corner_normals(prim));
             let st = surface.corner_texcoords(prim);
             for k in 0..3 {
-                for axis in 0..3 {
-                    cluster.vertices[k][axis][l] = v[k][axis];
-                    cluster.normals[k][axis][l] = n[k][axis];
-                }
                 cluster.texcoords[k][0][l] = st[k].x;
                 cluster.texcoords[k][1][l] = st[k].y;
             }
-            let range = offsets(prim);
-            for (end, w) in range.into_iter().enumerate() {
-                cluster.offsets[end][l] = AtomicU32::new(w.to_bits());
-            }
             let patch = surface.patch(prim);
-            if is_folded(&patch, range.map(f64::from)) {
-                *cluster.prims[l].get_mut() |= FOLDED;
-            }
+            cluster.place(l, (v, n), &patch, offsets(prim));
             let [a, b, c] = patch.texels;
             if (b - a).abs().max((c - a).abs()).max_element() > LONG_TEXELS {
                 *cluster.prims[l].get_mut() |= LONG;
@@ -96,6 +86,58 @@ impl Cluster {
             }
         }
         cluster
+    }
+
+    /// Puts corners and the range of w into a lane; `patch` is over the same corners.
+    fn place(
+        &mut self,
+        lane: usize,
+        (v, n): TriangleCorners,
+        patch: &Patch<'_>,
+        offsets: [f32; 2],
+    ) {
+        for k in 0..3 {
+            for axis in 0..3 {
+                self.vertices[k][axis][lane] = v[k][axis];
+                self.normals[k][axis][lane] = n[k][axis];
+            }
+        }
+        for (end, w) in offsets.into_iter().enumerate() {
+            *self.offsets[end][lane].get_mut() = w.to_bits();
+        }
+        let prim = self.prims[lane].get_mut();
+        *prim &= !FOLDED;
+        if is_folded(patch, offsets.map(f64::from)) {
+            *prim |= FOLDED;
+        }
+    }
+
+    /// The same prisms, the first `count` lanes, over other corners of their triangles.
+    pub fn moved(
+        &self,
+        surface: &DisplacedSurface,
+        count: usize,
+        corners: impl Fn(u32) -> TriangleCorners,
+    ) -> Self {
+        let copy = |of: &[AtomicU32; LANES]| {
+            std::array::from_fn(|l| AtomicU32::new(of[l].load(Ordering::Relaxed)))
+        };
+        let mut moved = Self {
+            offsets: [copy(&self.offsets[0]), copy(&self.offsets[1])],
+            prims: copy(&self.prims),
+            ..*self
+        };
+        for lane in 0..LANES {
+            // Lanes that are not used repeat the first.
+            let of = if lane < count { lane } else { 0 };
+            let prim = self.prim(of);
+            let corners = corners(prim);
+            let patch = surface.patch_over(prim, corners);
+            let displacements = surface.patch(prim).displacements_of(self.offsets(of));
+            let offsets = patch.offsets_of(displacements);
+            moved.place(lane, corners, &patch, offsets);
+        }
+        moved
     }
 
     /// A lane's base triangle with its flags.

@@ -45,6 +45,14 @@ impl ExactPrisms {
         })
     }
 
+    /// One cluster of as many prisms.
+    pub fn of_one(cluster: Cluster, prims: usize) -> Self {
+        Self {
+            clusters: vec![cluster],
+            prims,
+        }
+    }
+
     /// Prisms in a cluster: its first lanes.
     #[inline(always)]
     pub fn len(&self, cluster: usize) -> usize {

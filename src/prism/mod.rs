@@ -17,6 +17,7 @@ mod frame;
 #[allow(unsafe_code)] // SIMD stamps
 mod kernel;
 mod march;
+mod motion;
 mod path;
 mod ray_frame;
 #[cfg(test)]
@@ -36,6 +37,7 @@ use glam::{DVec3, Vec3};
 
 use crate::ray::{Aabb, Ray};
 use crate::surface::{ChartEdges, ClosestPoint, DisplacedSurface, PointQuery, Seams, SurfacePoint};
+use cluster::Cluster;
 use exact::ExactPrisms;
 use kernel::Kernel;
 use uniform::UniformPrisms;
@@ -44,6 +46,7 @@ pub use detail::Lod;
 pub use edits::{BoundsChange, EditBounds};
 pub use explain::{CurvePoint, Explanation, Fate, SpanChild};
 pub use march::{March, MarchError, Step};
+pub use motion::MovingPrisms;
 pub use simd::SimdLevel;
 
 /// Where a ray first meets the surface inside one prism.
@@ -108,6 +111,9 @@ impl From<March> for PrismOptions {
     }
 }
 
+/// Ulps by which bounds go beyond what they hold.
+const BOUNDS_ULPS: f32 = 16.0;
+
 /// What a march reads beside mesh and map.
 enum Parts {
     Exact(ExactPrisms),
@@ -155,6 +161,18 @@ impl Prisms {
             room,
             growths: AtomicU64::new(0),
         })
+    }
+
+    /// One cluster alone, of as many prisms, found as these prisms are; without level of detail.
+    fn of_one(&self, cluster: Cluster, prims: usize) -> Self {
+        Self {
+            surface: self.surface.clone(),
+            parts: Parts::Exact(ExactPrisms::of_one(cluster, prims)),
+            charts: None,
+            spread: AtomicU32::new(0),
+            growths: AtomicU64::new(0),
+            ..*self
+        }
     }
 
     /// The same prisms with kernels of a given level (for tests and benches); `None` if this machine lacks it.
@@ -221,8 +239,7 @@ impl Prisms {
                 self.prism_bounds(primitive, record.offsets())
             }
         };
-        const ULPS: f32 = 16.0;
-        bounds.padded(ULPS)
+        bounds.padded(BOUNDS_ULPS)
     }
 
     /// Conservative bounds of the surface over one base triangle: every point is sum b_i (v_i + w n_i) for one w of

@@ -10,7 +10,7 @@ use super::Ray;
 ///
 /// A lane whose ray is not [valid](Ray::is_valid) is empty: it hits nothing. Rays of a packet may be answered faster
 /// than each alone when they go the same way from about the same place; the answers are the same.
-// Word for word Embree's RTCRay8, so that packets pass through it as they are: `time` and `flags` are its own.
+// Word for word Embree's RTCRay8, so that packets pass through it as they are; `time` is private, for Embree takes no NaN, and `flags` its own.
 #[repr(C, align(32))]
 #[derive(Clone, Debug)]
 pub struct RayPacket {
@@ -68,6 +68,7 @@ impl RayPacket {
         }
         self.tnear[lane] = ray.tnear;
         self.tfar[lane] = ray.tfar;
+        self.time[lane] = ray.time_within();
         self.mask[lane] = ray.mask;
         self.key[lane] = ray.key;
     }
@@ -87,6 +88,7 @@ impl RayPacket {
             direction: vector(&self.direction),
             tnear: self.tnear[lane],
             tfar: self.tfar[lane],
+            time: self.time[lane],
             mask: self.mask[lane],
             key: self.key[lane],
         }
@@ -140,6 +142,7 @@ mod tests {
                 direction: Vec3::new(3.0 + x, 4.0 + x, 5.0 + x),
                 tnear: 6.0 + x,
                 tfar: 7.0 + x,
+                time: x / 8.0,
                 mask: 8 + i,
                 key: 9 + i,
             }

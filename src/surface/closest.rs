@@ -24,7 +24,7 @@ use std::collections::BinaryHeap;
 
 use glam::{Affine3A, DVec2, Vec3};
 
-use super::DisplacedSurface;
+use super::{DisplacedSurface, Patch};
 use bounds::{Part, Placed};
 
 /// The nearest point of a displaced surface.
@@ -202,27 +202,35 @@ impl DisplacedSurface {
         prims: impl IntoIterator<Item = u32>,
         query: &PointQuery,
     ) -> Option<ClosestPoint> {
-        if !query.is_valid() {
-            return None;
-        }
         let prims = prims.into_iter();
-        let placed = prims.filter_map(|prim| Placed::new(self.patch(prim), prim, query));
-        let mut search = Search {
-            placed: placed.collect(),
-            heap: BinaryHeap::new(),
-            distance: query.radius.into(),
-            best: None,
-        };
-        search.run();
-        let (placed, place) = search.best?;
-        let placed = &search.placed[placed];
-        let offset = placed.position(place);
-        Some(ClosestPoint {
-            distance: search.distance as f32,
-            point: (query.point.as_dvec3() + offset).as_vec3(),
-            prim: placed.prim,
-            u: place.x as f32,
-            v: place.y as f32,
-        })
+        closest(prims.map(|prim| (prim, self.patch(prim))), query)
     }
+}
+
+/// The same for given pieces of S and their triangles.
+pub(super) fn closest<'m>(
+    patches: impl Iterator<Item = (u32, Patch<'m>)>,
+    query: &PointQuery,
+) -> Option<ClosestPoint> {
+    if !query.is_valid() {
+        return None;
+    }
+    let placed = patches.filter_map(|(prim, patch)| Placed::new(patch, prim, query));
+    let mut search = Search {
+        placed: placed.collect(),
+        heap: BinaryHeap::new(),
+        distance: query.radius.into(),
+        best: None,
+    };
+    search.run();
+    let (placed, place) = search.best?;
+    let placed = &search.placed[placed];
+    let offset = placed.position(place);
+    Some(ClosestPoint {
+        distance: search.distance as f32,
+        point: (query.point.as_dvec3() + offset).as_vec3(),
+        prim: placed.prim,
+        u: place.x as f32,
+        v: place.y as f32,
+    })
 }

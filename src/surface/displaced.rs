@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Affine2, DVec2, Vec2, Vec3};
 use thiserror::Error;
 
-use super::{BaseMesh, DisplacementMap, Patch, Seams, UvTransform, Wall, seams};
+use super::{BaseMesh, Corners, DisplacementMap, Patch, Seams, UvTransform, Wall, seams};
 
 /// How a map's heights become displacement: D = scale * (h - midlevel).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -159,6 +159,14 @@ impl DisplacedSurface {
         self
     }
 
+    /// The same over other vertices of the mesh: open seams only, for walls depend on normals.
+    pub(super) fn with_vertices(&self, positions: Vec<Vec3>, normals: Vec<Vec3>) -> Self {
+        Self {
+            mesh: Arc::new(self.mesh.with_vertices(positions, normals)),
+            ..self.clone()
+        }
+    }
+
     /// What happens where sheets part.
     pub fn seams(&self) -> Seams {
         self.seams
@@ -195,6 +203,12 @@ impl DisplacedSurface {
 
     /// The piece of the surface over one base triangle.
     pub fn patch(&self, triangle: u32) -> Patch<'_> {
+        let (mesh, normals) = (&self.mesh, self.mesh.corner_normals(triangle));
+        self.patch_over(triangle, (mesh.corners(triangle), normals))
+    }
+
+    /// The same where the triangle's corners are elsewhere.
+    pub(crate) fn patch_over(&self, triangle: u32, (vertices, normals): Corners) -> Patch<'_> {
         let texcoords = self.corner_texcoords(triangle).map(|st| st.as_dvec2());
         let wrap = self.map.wrap();
         let periods = DVec2::new(
@@ -202,8 +216,8 @@ impl DisplacedSurface {
             wrap.whole_periods(texcoords[0].y),
         );
         Patch {
-            vertices: self.mesh.corners(triangle).map(|v| v.as_dvec3()),
-            normals: self.mesh.corner_normals(triangle).map(|n| n.as_dvec3()),
+            vertices: vertices.map(|v| v.as_dvec3()),
+            normals: normals.map(|n| n.as_dvec3()),
             texels: texcoords.map(|st| self.map.to_texel(st - periods)),
             map: &self.map,
             scale: f64::from(self.displacement.scale),

@@ -113,7 +113,7 @@ impl DisplacedSurface {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn interpolate(&self, prim: u32, u: f32, v: f32) -> Result<Interpolated, InterpolateError> {
-        self.entry(0, prim, u, v)
+        self.checked(0, prim, u, v, || self.with_derivatives(prim, u, v))
     }
 
     /// [`Self::interpolate`] for many points at once, as `rtcInterpolateN`: entry i of `out` is the surface at `prims[i]`, `u[i]`, `v[i]`.
@@ -147,18 +147,21 @@ impl DisplacedSurface {
         }
         for (entry, out) in out.iter_mut().enumerate() {
             if valid.is_none_or(|valid| valid[entry]) {
-                *out = self.entry(entry, prims[entry], u[entry], v[entry])?;
+                let (prim, u, v) = (prims[entry], u[entry], v[entry]);
+                *out = self.checked(entry, prim, u, v, || self.with_derivatives(prim, u, v))?;
             }
         }
         Ok(())
     }
 
-    fn entry(
+    /// What `point` gives, called only for what there is.
+    pub(super) fn checked(
         &self,
         entry: usize,
         prim: u32,
         u: f32,
         v: f32,
+        point: impl FnOnce() -> Interpolated,
     ) -> Result<Interpolated, InterpolateError> {
         let primitives = self.primitives();
         if prim as usize >= primitives {
@@ -171,7 +174,7 @@ impl DisplacedSurface {
         if !(u.is_finite() && v.is_finite()) {
             return Err(InterpolateError::BadCoordinates { entry, u, v });
         }
-        let found = self.with_derivatives(prim, u, v);
+        let found = point();
         let sound = found.point.position + found.du + found.dv;
         if sound.is_finite() {
             Ok(found)
@@ -183,12 +186,12 @@ impl DisplacedSurface {
     fn with_derivatives(&self, prim: u32, u: f32, v: f32) -> Interpolated {
         match (prim as usize).checked_sub(self.mesh.triangles().len()) {
             Some(wall) => self.on_wall(wall, u, v),
-            None => self.on_triangle(prim, u, v),
+            None => self.on_triangle(&self.patch(prim), prim, u, v),
         }
     }
 
-    fn on_triangle(&self, prim: u32, u: f32, v: f32) -> Interpolated {
-        let patch = self.patch(prim);
+    /// `patch` is that of `prim`, at some time.
+    pub(super) fn on_triangle(&self, patch: &Patch<'_>, prim: u32, u: f32, v: f32) -> Interpolated {
         let [st0, st1, st2] = self.mesh.corner_texcoords(prim);
         let texcoord = st0 + u * (st1 - st0) + v * (st2 - st0);
         let (u, v) = (f64::from(u), f64::from(v));
@@ -197,9 +200,9 @@ impl DisplacedSurface {
             point: SurfacePoint {
                 position: at.position.as_vec3(),
                 base_position: patch.base(u, v).as_vec3(),
-                base_normal: unit_normal(&patch, u, v),
+                base_normal: unit_normal(patch, u, v),
                 geometric_normal: at.ng.normalize_or(patch.face_normal()).as_vec3(),
-                shading_normal: smooth_normal::smooth(&patch, u, v).as_vec3(),
+                shading_normal: smooth_normal::smooth(patch, u, v).as_vec3(),
                 texcoord,
                 displacement: at.displacement as f32,
                 tolerance: 0.0,

@@ -329,7 +329,7 @@ impl MeshBuilder {
 }
 
 /// Whether single precision can tell the face's normal.
-fn has_area(corners: [Vec3; 3]) -> bool {
+pub(super) fn has_area(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.as_dvec3());
     let longest = (b - a)
         .length_squared()
@@ -360,6 +360,16 @@ fn keep<T>(values: &mut Vec<T>, used: &[bool]) {
 }
 
 impl BaseMesh {
+    /// The same triangles over other vertices, as many, finite, normals of unit length. A triangle may have no area then.
+    pub(super) fn with_vertices(&self, positions: Vec<Vec3>, normals: Vec<Vec3>) -> Self {
+        debug_assert!(positions.len() == self.positions.len() && normals.len() == positions.len());
+        Self {
+            positions,
+            normals,
+            ..self.clone()
+        }
+    }
+
     /// Vertex positions.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions

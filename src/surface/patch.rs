@@ -80,12 +80,24 @@ impl Patch<'_> {
         let [a, b, c] = self.vertices;
         let size = (b - a).abs().max((c - a).abs()).max_element();
         let slack = 1e-6 * (low.abs().max(high.abs()) + size);
-        let stretch = 1.000_001 / self.shortest_normal();
+        let stretch = self.stretch();
         let (low, high) = (low - slack, high + slack);
         [
             low.min(low * stretch) as f32,
             high.max(high * stretch) as f32,
         ]
+    }
+
+    /// A range of D that holds the one which [`Self::offsets_of`] was given.
+    pub fn displacements_of(&self, [low, high]: [f32; 2]) -> [f64; 2] {
+        let inverse = 1.0 / self.stretch();
+        let (low, high) = (f64::from(low), f64::from(high));
+        [low.max(low * inverse), high.min(high * inverse)]
+    }
+
+    /// |w| is at most this times |D|.
+    fn stretch(&self) -> f64 {
+        1.000_001 / self.shortest_normal()
     }
 
     /// |N'(b)| at its smallest over the triangle, from below: |N'|^2 = 1 - sum b_i b_j |n_i - n_j|^2 and the sum

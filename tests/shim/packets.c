@@ -22,7 +22,7 @@ enum { REPORTED_PRIM = 41 };
 
 static unsigned packet_tests;
 
-static void ball_bounds(const void *user, uint32_t prim, float out[6]) {
+static void ball_bounds(const void *user, uint32_t prim, uint32_t step, float out[6]) {
   (void)user;
   (void)prim;
   for (int k = 0; k < 6; k++)
@@ -250,7 +250,7 @@ static pm_scene *scene_with(const pm_device *device, pm_geometry *geometry) {
 
 static void check_ball(const pm_device *device, bool filtered, const pm_hit_test *test) {
   const float expected_t = filtered ? 3.0f : 2.0f; /* the direction's length is 2 */
-  pm_geometry *ball = pm_geometry_new_user(device, test, NULL, 1);
+  pm_geometry *ball = pm_geometry_new_user(device, test, NULL, 1, 1);
   if (filtered)
     pm_geometry_set_filter(ball, leaving, NULL);
   packet_tests = 0;

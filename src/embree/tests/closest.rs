@@ -12,7 +12,7 @@ use crate::surface::{
 use crate::trace::INVALID_ID;
 
 /// A hilly square of 2 x `n` x `n` triangles.
-fn hills(n: u32) -> Arc<Prisms> {
+pub fn hills(n: u32) -> Arc<Prisms> {
     let mut mesh = MeshBuilder::default();
     for j in 0..=n {
         for i in 0..=n {

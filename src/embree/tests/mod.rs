@@ -6,6 +6,7 @@ mod edit;
 mod faults;
 mod filter;
 mod instance;
+mod motion;
 mod packet;
 mod scene;
 mod tracer;

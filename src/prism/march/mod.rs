@@ -57,6 +57,14 @@ pub enum MarchError {
          leave it off (lod = \"off\"), or take the exact march (march = \"exact\")"
     )]
     LodNeedsExact,
+    /// The uniform march knows no motion.
+    #[error(
+        "the mesh moves, and the uniform march knows no motion; take the exact march (march = \"exact\")"
+    )]
+    MotionNeedsExact,
+    /// There is no level of detail of what moves.
+    #[error("the mesh moves, and what moves has no level of detail; leave it off (lod = \"off\")")]
+    MotionHasNoLod,
     /// More base triangles than the exact march's records can number.
     #[error("the mesh has {found} triangles; the exact march takes at most {max}")]
     TooManyTriangles {
