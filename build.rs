@@ -20,7 +20,12 @@ mod embree {
     use std::path::{Path, PathBuf};
 
     const PREFIXES: [&str; 4] = ["/usr", "/usr/local", "/opt/homebrew", "/opt/local"];
-    const SOURCES: [&str; 2] = ["ffi/shim.c", "ffi/point_query.c"];
+    const SOURCES: [&str; 4] = [
+        "ffi/shim.c",
+        "ffi/user_geometry.c",
+        "ffi/point_query.c",
+        "ffi/foreign.c",
+    ];
     const INSTALL_HINT: &str = "install Embree and libclang (Debian, Ubuntu: `apt install libembree-dev libclang-dev`), \
         or set EMBREE_DIR to a prefix that has include/embree4 or include/embree3, \
         or build without Embree: `--no-default-features --features bvh`";
@@ -37,7 +42,12 @@ mod embree {
         for variable in ["EMBREE_DIR", "EMBREE_VERSION"] {
             println!("cargo::rerun-if-env-changed={variable}");
         }
-        for file in SOURCES.iter().chain(&["ffi/shim.h", "ffi/embree.h"]) {
+        for file in SOURCES.iter().chain(&[
+            "ffi/shim.h",
+            "ffi/prismarch.h",
+            "ffi/embree.h",
+            "ffi/lanes.h",
+        ]) {
             println!("cargo::rerun-if-changed={file}");
         }
         let embree = find()?;
@@ -143,16 +153,28 @@ mod embree {
         })
     }
 
-    /// bindgen panics where libclang is missing: that becomes an ordinary message here.
+    /// Rust declarations of what both headers declare.
     fn generate() -> Result<(), String> {
-        let out =
-            PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?).join("shim.rs");
+        declare("ffi/shim.h", "shim.rs", "(pm|PM)_.*", &[])?;
+        let own = ["-DPRISMARCH_WITHOUT_EMBREE"];
+        declare(
+            "ffi/prismarch.h",
+            "prismarch.rs",
+            "(prismarch|PRISMARCH)_.*",
+            &own,
+        )
+    }
+
+    /// bindgen panics where libclang is missing: that becomes an ordinary message here.
+    fn declare(header: &str, out: &str, items: &str, arguments: &[&str]) -> Result<(), String> {
+        let out = PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?).join(out);
         let hook = panic::take_hook();
         panic::set_hook(Box::new(|_| {}));
         let bindings = panic::catch_unwind(|| {
             bindgen::Builder::default()
-                .header("ffi/shim.h")
-                .allowlist_item("(pm|PM)_.*")
+                .header(header)
+                .clang_args(arguments)
+                .allowlist_item(items)
                 .rust_edition(bindgen::RustEdition::Edition2024)
                 .generate_comments(false)
                 .layout_tests(true)
@@ -161,9 +183,7 @@ mod embree {
         panic::set_hook(hook);
         match bindings {
             Err(_) => Err(format!("libclang was not found: {INSTALL_HINT}")),
-            Ok(Err(error)) => Err(format!(
-                "no bindings could be made from ffi/shim.h: {error}"
-            )),
+            Ok(Err(error)) => Err(format!("no bindings could be made from {header}: {error}")),
             Ok(Ok(bindings)) => bindings
                 .write_to_file(&out)
                 .map_err(|error| format!("cannot write {}: {error}", out.display())),

@@ -21,9 +21,14 @@ struct pm_geometry {
   pm_filter filter; /* NULL: none */
   const void *filter_user;
   pm_scene *instanced; /* NULL: no instance */
+  bool is_foreign;     /* the caller's own: filters get `caller_data`, and may be set behind our back */
+  void *caller_data;
 };
 
-/* The callback of user geometries in pm_closest1. */
+/* The bounds, intersect, occluded and point query functions of a user geometry whose user data is a pm_geometry. */
+void pm_set_callbacks(RTCGeometry geometry);
+void pm_on_filter(const struct RTCFilterFunctionNArguments *args);
+/* Has nothing to say but in pm_closest1 and pm_closest_in. */
 bool pm_on_point_query(struct RTCPointQueryFunctionArguments *args);
 
 #endif

@@ -3,12 +3,16 @@
 
 #include <string.h>
 
-/* What rtcPointQuery hands through to the callback. */
 typedef struct search {
   RTCScene scene;
+  bool is_foreign; /* instances in the scene are not ours */
   bool any;
   pm_closest best;
 } search;
+
+/* The search that this thread is in: Embree calls back on the thread that asks, and tells a callback neither the geometry nor
+ * the scene. NULL in searches of a caller's own. */
+static _Thread_local search *present;
 
 /* The geometry of a callback: Embree names it by numbers alone. */
 static const struct pm_geometry *geometry_of(const search *s, const struct RTCPointQueryFunctionArguments *args) {
@@ -22,7 +26,9 @@ static const struct pm_geometry *geometry_of(const search *s, const struct RTCPo
 
 /* Point and radius stay those of the world, also under instances: a transform that stretches has no one factor for distances. */
 bool pm_on_point_query(struct RTCPointQueryFunctionArguments *args) {
-  search *s = args->userPtr;
+  search *s = present;
+  if (!s || (s->is_foreign && args->context->instStackSize))
+    return false;
   const struct pm_geometry *g = geometry_of(s, args);
   if (!g->test.closest)
     return false;
@@ -46,13 +52,24 @@ bool pm_on_point_query(struct RTCPointQueryFunctionArguments *args) {
   return true;
 }
 
-bool pm_closest1(const pm_scene *scene, const float point[3], float radius, float time, pm_closest *found) {
-  search s = {.scene = (RTCScene)scene};
+static bool closest(search *s, const float point[3], float radius, float time, pm_closest *found) {
   struct RTCPointQuery query = {point[0], point[1], point[2], time, radius};
   struct RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
-  rtcPointQuery(s.scene, &query, &context, NULL, &s);
-  if (s.any)
-    *found = s.best;
-  return s.any;
+  /* A hit test may ask, too. */
+  search *outer = present;
+  present = s;
+  rtcPointQuery(s->scene, &query, &context, NULL, NULL);
+  present = outer;
+  if (s->any)
+    *found = s->best;
+  return s->any;
+}
+
+bool pm_closest1(const pm_scene *scene, const float point[3], float radius, float time, pm_closest *found) {
+  return closest(&(search){.scene = (RTCScene)scene}, point, radius, time, found);
+}
+
+bool pm_closest_in(void *scene, const float point[3], float radius, float time, pm_closest *found) {
+  return closest(&(search){.scene = scene, .is_foreign = true}, point, radius, time, found);
 }

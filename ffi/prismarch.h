@@ -113,9 +113,10 @@ prismarch_status prismarch_map_size(const prismarch_map *map, uint32_t *width, u
  * the geometries over the map need rtcCommitGeometry and their scenes rtcCommitScene before the next ray. */
 prismarch_status prismarch_map_update(prismarch_map *map, uint32_t x, uint32_t y, uint32_t width, uint32_t height,
                                       const prismarch_texels *texels, bool *commit_needed, prismarch_error *error);
-void prismarch_map_retain(prismarch_map *map);
-/* NULL is allowed. The last release frees it, once no surface has it. */
-void prismarch_map_release(prismarch_map *map);
+prismarch_status prismarch_map_retain(prismarch_map *map);
+/* NULL is allowed. The last release frees it, once no surface has it. One too many is noticed (PRISMARCH_ERROR_HANDLE) unless the
+ * memory serves for something else already. */
+prismarch_status prismarch_map_release(prismarch_map *map);
 
 /* Surfaces ------------------------------------------------------------------------------------------ */
 
@@ -185,8 +186,8 @@ typedef struct prismarch_surface_desc {
   const prismarch_vertices *later_steps;
 } prismarch_surface_desc;
 
-void prismarch_surface_desc_init(prismarch_surface_desc *desc);
-/* Triangles without area are refused: primIDs must stay the caller's. */
+prismarch_status prismarch_surface_desc_init(prismarch_surface_desc *desc);
+/* Triangles without area are never hit; primIDs stay the caller's. */
 prismarch_status prismarch_surface_create(const prismarch_surface_desc *desc, prismarch_surface **surface,
                                           prismarch_error *error);
 /* Moves the vertices of a time step (0 where nothing moves), as many as there were. Geometries of the surface need rtcCommitGeometry
@@ -198,9 +199,9 @@ prismarch_status prismarch_surface_update_vertices(prismarch_surface *surface, u
 prismarch_status prismarch_surface_check(prismarch_surface *surface, prismarch_error *error);
 /* Bytes of the surface without its map. */
 prismarch_status prismarch_surface_bytes(const prismarch_surface *surface, size_t *bytes, prismarch_error *error);
-void prismarch_surface_retain(prismarch_surface *surface);
-/* NULL is allowed. Geometries keep the surface: it may be released before they are. */
-void prismarch_surface_release(prismarch_surface *surface);
+prismarch_status prismarch_surface_retain(prismarch_surface *surface);
+/* As prismarch_map_release. Geometries keep the surface: it may be released before they are. */
+prismarch_status prismarch_surface_release(prismarch_surface *surface);
 
 /* Interpolation ------------------------------------------------------------------------------------- */
 

@@ -195,4 +195,22 @@ uint32_t pm_occluded8(const pm_scene *scene, const pm_ray8 *rays, uint32_t valid
 /* The nearest point of the user geometries, no further than `radius`. */
 bool pm_closest1(const pm_scene *scene, const float point[3], float radius, float time, pm_closest *found);
 
+/* A caller's own device and scenes -------------------------------------------------------------------- */
+
+/* Here `device`, `geometry` and `scene` are Embree's own handles. */
+
+/* Major version of the Embree that made the device; 0 if it cannot be told. */
+uint32_t pm_foreign_major(void *device);
+/* A user geometry of the device, with one reference; NULL on failure. Once Embree destroys it gone(user) is called, unless that cannot be
+ * known on this Embree. */
+void *pm_foreign_new(void *device, const pm_hit_test *test, void *user, uint32_t primitives, uint32_t time_steps,
+                     void (*gone)(void *user));
+void pm_foreign_release(void *geometry);
+/* Commits and attaches: the geomID. */
+uint32_t pm_foreign_attach(void *scene, void *geometry);
+void pm_foreign_set_caller_data(void *geometry, void *data);
+void *pm_foreign_caller_data(void *geometry);
+/* pm_closest1 in a scene whose instances are not entered. */
+bool pm_closest_in(void *scene, const float point[3], float radius, float time, pm_closest *found);
+
 #endif

@@ -6,6 +6,8 @@
 
 #[cfg(feature = "bvh")]
 pub mod bvh;
+#[cfg(feature = "embree")]
+mod capi;
 pub mod cli;
 pub mod demo;
 #[cfg(feature = "embree")]

@@ -1,12 +1,12 @@
 //! The device: Embree's threads, memory and errors.
 
-use std::any::Any;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::NonNull;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 
+use super::faults::Faults;
 use super::sys;
 use super::{EmbreeError, ErrorCode};
 
@@ -54,34 +54,16 @@ impl Drop for Inner {
 
 /// What the callbacks write.
 #[derive(Debug)]
-pub(super) struct DeviceState {
+struct DeviceState {
     current: AtomicI64,
     peak: AtomicI64,
     /// Negative: none.
     limit: i64,
     refused: AtomicBool,
-    fault: Mutex<Option<EmbreeError>>,
+    faults: Arc<Faults>,
 }
 
 impl DeviceState {
-    /// Keeps the first fault of a callback until [`Device::check`] asks.
-    pub(super) fn record(&self, error: EmbreeError) {
-        self.fault
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get_or_insert(error);
-    }
-
-    /// Keeps a caught panic as a fault.
-    pub(super) fn record_panic(&self, payload: &(dyn Any + Send)) {
-        let message = payload
-            .downcast_ref::<&str>()
-            .map(|s| (*s).to_string())
-            .or_else(|| payload.downcast_ref::<String>().cloned())
-            .unwrap_or_else(|| "(no message)".to_string());
-        self.record(EmbreeError::HitTestPanicked { message });
-    }
-
     /// False refuses an allocation that is about to happen: such bytes are not counted.
     fn account(&self, bytes: i64, post: bool) -> bool {
         let total = self.current.fetch_add(bytes, Ordering::Relaxed) + bytes;
@@ -117,7 +99,7 @@ unsafe extern "C" fn on_error(user: *const c_void, code: c_int, message: *const 
     if let Some(message) = unguarded {
         // SAFETY: `user` is the DeviceState given to pm_device_new, which outlives the device.
         let state = unsafe { &*user.cast::<DeviceState>() };
-        state.record(EmbreeError::Library {
+        state.faults.record(EmbreeError::Library {
             code: ErrorCode::from_raw(code),
             message,
         });
@@ -145,7 +127,7 @@ impl Device {
             peak: AtomicI64::new(0),
             limit,
             refused: AtomicBool::new(false),
-            fault: Mutex::new(None),
+            faults: Arc::default(),
         });
         let user: *const DeviceState = Arc::as_ptr(&state);
         let mut code = 0;
@@ -208,21 +190,15 @@ impl Device {
     /// The first fault since the last call: a panic in a hit test or filter, or an error while rays were traced.
     /// Committing a scene asks too.
     pub fn check(&self) -> Result<(), EmbreeError> {
-        let mut fault = self
-            .inner
-            .state
-            .fault
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        fault.take().map_or(Ok(()), Err)
+        self.faults().take()
     }
 
     pub(super) fn raw(&self) -> *const sys::pm_device {
         self.inner.raw.as_ptr()
     }
 
-    pub(super) fn state(&self) -> &Arc<DeviceState> {
-        &self.inner.state
+    pub(super) fn faults(&self) -> &Arc<Faults> {
+        &self.inner.state.faults
     }
 
     /// Runs a call into the shim and returns what it reported as an error.

@@ -83,6 +83,14 @@ pub enum EmbreeError {
         /// The panic's message.
         message: String,
     },
+    /// A device of another major version than the headers that this was built with.
+    #[error("the device is of Embree {found}; this was built for Embree {expected}")]
+    WrongVersion {
+        /// Major version of the device.
+        found: u32,
+        /// Major version of the headers.
+        expected: u32,
+    },
     /// A hit test with no time step at all.
     #[error("a hit test has 0 time steps; expected at least 1")]
     NoTimeSteps,

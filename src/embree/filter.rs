@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use super::device::DeviceState;
+use super::faults::Faults;
 use super::scene::hit_from_raw;
 use super::sys;
 use super::user::ray_from_raw;
@@ -16,14 +16,14 @@ pub type HitFilter = Box<dyn Fn(&Ray, &Hit) -> bool + Send + Sync>;
 
 pub(super) struct FilterData {
     filter: HitFilter,
-    state: Arc<DeviceState>,
+    faults: Arc<Faults>,
 }
 
 impl FilterData {
-    pub(super) fn new(filter: HitFilter, state: &Arc<DeviceState>) -> Self {
+    pub(super) fn new(filter: HitFilter, faults: &Arc<Faults>) -> Self {
         Self {
             filter,
-            state: state.clone(),
+            faults: faults.clone(),
         }
     }
 
@@ -47,7 +47,7 @@ unsafe extern "C" fn on_filter(
         (data.filter)(&ray_from_raw(ray), &hit_from_raw(candidate))
     }))
     .unwrap_or_else(|payload| {
-        data.state.record_panic(&*payload);
+        data.faults.record_panic(&*payload);
         false
     })
 }

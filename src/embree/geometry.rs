@@ -80,7 +80,7 @@ impl Geometry {
     /// Lets `filter` decide of every candidate hit whether it counts; a rejected one lets the ray go on to
     /// what is behind. Called from many threads, in no order, also for hits that turn out not to be the first.
     pub fn with_filter(mut self, filter: HitFilter) -> Self {
-        let data = Arc::new(FilterData::new(filter, self.device.state()));
+        let data = Arc::new(FilterData::new(filter, self.device.faults()));
         // SAFETY: a live geometry that no scene has yet; `data` is dropped after it is freed.
         unsafe { data.install(self.raw.as_ptr()) };
         self.filter = Some(data);

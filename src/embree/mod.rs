@@ -15,11 +15,13 @@
 
 mod device;
 mod error;
+mod faults;
 mod filter;
 mod geometry;
 mod grids;
 mod instance;
 mod prisms;
+pub mod raw;
 mod scene;
 mod sys;
 #[cfg(test)]
@@ -31,6 +33,8 @@ mod vertices;
 
 pub use device::{Device, DeviceOptions, Memory};
 pub use error::{EmbreeError, ErrorCode};
+pub use faults::Faults;
+pub(crate) use faults::panic_message;
 pub use filter::HitFilter;
 pub use geometry::Geometry;
 pub use grids::{Grid, GridGeometry};

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
 
-use super::device::DeviceState;
+use super::faults::Faults;
 use super::geometry::Kind;
 use super::{Device, EmbreeError, Geometry, sys};
 use crate::prism::PrismHit;
@@ -98,7 +98,7 @@ impl From<UserGeometry> for Geometry {
 impl UserGeometry {
     /// A geometry whose primitives are those of `test`, which lives as long as Embree may call it.
     pub fn new<T: HitTest + 'static>(device: &Device, test: Arc<T>) -> Result<Self, EmbreeError> {
-        let stored = Stored::new(device, test)?;
+        let stored = Stored::new(device.faults().clone(), test)?;
         // SAFETY: the callbacks are those of Stored<T>, and the pointer leads to the Stored<T> that is kept.
         let geometry = unsafe {
             Geometry::from_raw(device, Kind::User, stored.clone(), || {
@@ -122,7 +122,7 @@ impl Geometry {
         test: Arc<T>,
     ) -> Result<(), EmbreeError> {
         debug_assert_eq!(self.kind, Kind::User);
-        let stored = Stored::new(&self.device, test)?;
+        let stored = Stored::new(self.device.faults().clone(), test)?;
         // SAFETY: as in `UserGeometry::new`; the scene is not traced now, so that nothing runs in the old test.
         let outcome = self.device.guarded(|| unsafe {
             sys::pm_geometry_set_test(
@@ -140,11 +140,11 @@ impl Geometry {
 }
 
 /// What the geometry's user pointer leads to.
-struct Stored<T> {
+pub(super) struct Stored<T> {
     test: Arc<T>,
-    state: Arc<DeviceState>,
-    primitives: u32,
-    time_steps: u32,
+    faults: Arc<Faults>,
+    pub(super) primitives: u32,
+    pub(super) time_steps: u32,
 }
 
 /// Ulps of the largest coordinate by which boxes grow: Embree's box test rounds a handful of times, and its
@@ -155,7 +155,7 @@ const PADDING_ULPS: f32 = 8.0;
 const LARGEST_COORDINATE: f32 = 1.844e18;
 
 impl<T: HitTest + 'static> Stored<T> {
-    const CALLBACKS: sys::pm_hit_test = sys::pm_hit_test {
+    pub(super) const CALLBACKS: sys::pm_hit_test = sys::pm_hit_test {
         bounds: Some(Self::on_bounds),
         intersect: Some(Self::on_intersect),
         occluded: Some(Self::on_occluded),
@@ -164,12 +164,12 @@ impl<T: HitTest + 'static> Stored<T> {
         closest: Some(Self::on_closest),
     };
 
-    fn new(device: &Device, test: Arc<T>) -> Result<Arc<Self>, EmbreeError> {
+    pub(super) fn new(faults: Arc<Faults>, test: Arc<T>) -> Result<Arc<Self>, EmbreeError> {
         let primitives = super::geometry::count("primitives", test.len())?;
         let time_steps = super::geometry::time_steps(test.time_steps())?;
         Ok(Arc::new(Self {
             test,
-            state: device.state().clone(),
+            faults,
             primitives,
             time_steps,
         }))
@@ -178,7 +178,7 @@ impl<T: HitTest + 'static> Stored<T> {
     /// No panic may cross the C frames below: it is kept for [`Device::check`], and the ray sees a miss.
     fn caught<R>(&self, miss: R, call: impl FnOnce() -> R) -> R {
         catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| {
-            self.state.record_panic(&*payload);
+            self.faults.record_panic(&*payload);
             miss
         })
     }
@@ -190,7 +190,7 @@ impl<T: HitTest + 'static> Stored<T> {
         if bounds.is_valid() && reach.cmple(Vec3::splat(LARGEST_COORDINATE)).all() {
             return bounds;
         }
-        self.state.record(EmbreeError::InvalidBounds {
+        self.faults.record(EmbreeError::InvalidBounds {
             prim,
             min: found.min,
             max: found.max,

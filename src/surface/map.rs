@@ -107,8 +107,8 @@ impl DisplacementMap {
     /// Largest width and height: texel indices fit 32 bits and an f32 texel coordinate still resolves 1/256.
     pub const MAX_SIDE: usize = 32768;
 
-    /// A map of `width` x `height` texels, bottom row first.
-    pub fn new(width: usize, height: usize, texels: Texels, wrap: Wrap) -> Result<Self, MapError> {
+    /// Whether a map may be this large.
+    pub(crate) fn check_size(width: usize, height: usize) -> Result<(), MapError> {
         if width == 0 || height == 0 {
             return Err(MapError::Empty { width, height });
         }
@@ -119,6 +119,12 @@ impl DisplacementMap {
                 max: Self::MAX_SIDE,
             });
         }
+        Ok(())
+    }
+
+    /// A map of `width` x `height` texels, bottom row first.
+    pub fn new(width: usize, height: usize, texels: Texels, wrap: Wrap) -> Result<Self, MapError> {
+        Self::check_size(width, height)?;
         if texels.len() != width * height {
             return Err(MapError::WrongLength {
                 width,

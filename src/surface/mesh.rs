@@ -329,7 +329,7 @@ impl MeshBuilder {
 }
 
 /// Whether single precision can tell the face's normal.
-pub(super) fn has_area(corners: [Vec3; 3]) -> bool {
+pub(crate) fn has_area(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.as_dvec3());
     let longest = (b - a)
         .length_squared()

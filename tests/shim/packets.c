@@ -4,6 +4,7 @@
  *
  * Includes the shim itself, which brings Embree's own calls. */
 #include "../../ffi/shim.c"
+#include "../../ffi/user_geometry.c"
 
 #include <stdio.h>
 

@@ -1,0 +1,122 @@
+//! From results and panics to statuses with a text.
+
+use std::fmt::Display;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::declarations::{self as c, prismarch_error, prismarch_status};
+use crate::embree::{EmbreeError, panic_message};
+use crate::image::ImageError;
+use crate::prism::MarchError;
+use crate::surface::{InterpolateError, MapError, MeshError, MotionError, SurfaceError};
+
+/// A status other than OK, and what to say.
+#[derive(Debug)]
+pub struct Failure {
+    pub status: prismarch_status,
+    pub message: String,
+}
+
+impl Failure {
+    pub fn argument(message: impl Display) -> Self {
+        Self::new(c::prismarch_status_PRISMARCH_ERROR_ARGUMENT, message)
+    }
+
+    pub fn data(message: impl Display) -> Self {
+        Self::new(c::prismarch_status_PRISMARCH_ERROR_DATA, message)
+    }
+
+    pub fn null(what: &str) -> Self {
+        let message = format!("{what} is NULL");
+        Self::new(c::prismarch_status_PRISMARCH_ERROR_NULL, message)
+    }
+
+    pub fn handle(what: &str) -> Self {
+        let message =
+            format!("{what} is no live handle; it was released, or is one of another kind");
+        Self::new(c::prismarch_status_PRISMARCH_ERROR_HANDLE, message)
+    }
+
+    pub fn in_flight() -> Self {
+        Self::new(
+            c::prismarch_status_PRISMARCH_ERROR_IN_FLIGHT,
+            "rays are in flight; updates must wait until no ray is",
+        )
+    }
+
+    fn new(status: prismarch_status, message: impl Display) -> Self {
+        Self {
+            status,
+            message: message.to_string(),
+        }
+    }
+}
+
+macro_rules! failure_from {
+    ($($error:ty => $status:ident,)*) => {$(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::new(c::$status, error)
+            }
+        }
+    )*};
+}
+
+failure_from! {
+    MeshError => prismarch_status_PRISMARCH_ERROR_DATA,
+    MotionError => prismarch_status_PRISMARCH_ERROR_DATA,
+    SurfaceError => prismarch_status_PRISMARCH_ERROR_ARGUMENT,
+    MarchError => prismarch_status_PRISMARCH_ERROR_ARGUMENT,
+    InterpolateError => prismarch_status_PRISMARCH_ERROR_ARGUMENT,
+    ImageError => prismarch_status_PRISMARCH_ERROR_FILE,
+    EmbreeError => prismarch_status_PRISMARCH_ERROR_EMBREE,
+}
+
+impl From<MapError> for Failure {
+    fn from(error: MapError) -> Self {
+        match error {
+            MapError::NotFinite { .. } => Self::data(error),
+            _ => Self::argument(error),
+        }
+    }
+}
+
+/// Runs a call from C: no panic gets out, and what is wrong is written to `error` where that is not null.
+///
+/// # Safety
+///
+/// `error` is null or valid for a write.
+pub unsafe fn answer(
+    error: *mut prismarch_error,
+    call: impl FnOnce() -> Result<(), Failure>,
+) -> prismarch_status {
+    let outcome = catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| {
+        Err(Failure {
+            status: c::prismarch_status_PRISMARCH_ERROR_PANIC,
+            message: format!("a fault of prismarch: {}", panic_message(&*payload)),
+        })
+    });
+    let (status, message) = match &outcome {
+        Ok(()) => (c::prismarch_status_PRISMARCH_OK, ""),
+        Err(failure) => (failure.status, failure.message.as_str()),
+    };
+    // SAFETY: the caller's promise.
+    if let Some(error) = unsafe { error.as_mut() } {
+        error.status = status;
+        write_text(&mut error.message, message);
+    }
+    status
+}
+
+/// As much as fits, in whole characters, ended by a zero.
+fn write_text(out: &mut [std::ffi::c_char], text: &str) {
+    let mut length = text.len().min(out.len() - 1);
+    while !text.is_char_boundary(length) {
+        length -= 1;
+    }
+    for (out, byte) in out
+        .iter_mut()
+        .zip(text.as_bytes()[..length].iter().chain(&[0]))
+    {
+        *out = *byte as std::ffi::c_char; // the same bits
+    }
+}
