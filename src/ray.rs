@@ -49,13 +49,6 @@ impl Ray {
         self.origin + t * self.direction
     }
 
-    /// The time as it counts: from 0 to 1.
-    #[inline(always)]
-    pub fn time_within(&self) -> f32 {
-        // Not clamp: NaN becomes 0.
-        self.time.max(0.0).min(1.0)
-    }
-
     /// False for a zero, NaN or infinite direction, a NaN or infinite origin, or a NaN interval: no
     /// backend is asked about such a ray, it hits nothing.
     pub fn is_valid(&self) -> bool {
@@ -65,6 +58,12 @@ impl Ray {
             && self.tnear >= 0.0
             && self.tfar >= self.tnear
     }
+}
+
+/// A time as it counts: the nearer end of [0, 1] for what is beyond, 0 for NaN.
+#[inline(always)]
+pub(crate) fn time_within(time: f32) -> f32 {
+    if time > 0.0 { time.min(1.0) } else { 0.0 }
 }
 
 /// An axis-aligned box.

@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::geometry::{Kind, count};
 use super::user::packet_to_raw;
 use super::{Device, EmbreeError, Geometry, HitTest, Instance, Prototype, sys};
-use crate::ray::{Aabb, Ray, RayPacket};
+use crate::ray::{Aabb, Ray, RayPacket, time_within};
 use crate::surface::PointQuery;
 use crate::trace::{Closest, Hit, MAX_INSTANCE_LEVELS};
 
@@ -386,7 +386,7 @@ impl Scene {
                 self.raw(),
                 point.as_ptr(),
                 radius,
-                time.max(0.0).min(1.0),
+                time_within(time),
                 &mut found,
             )
         };
@@ -456,7 +456,7 @@ fn ray_to_raw(ray: &Ray) -> sys::pm_ray {
         org: ray.origin.to_array(),
         tnear: ray.tnear,
         dir: ray.direction.to_array(),
-        time: ray.time_within(),
+        time: time_within(ray.time),
         tfar: ray.tfar,
         mask: ray.mask,
         id: ray.key,

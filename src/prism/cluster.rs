@@ -71,9 +71,8 @@ impl Cluster {
             let prim = of_lane(l);
             let (v, n) = (mesh.corners(prim), mesh.corner_normals(prim));
             let st = surface.corner_texcoords(prim);
-            for k in 0..3 {
-                cluster.texcoords[k][0][l] = st[k].x;
-                cluster.texcoords[k][1][l] = st[k].y;
+            for (texcoords, st) in cluster.texcoords.iter_mut().zip(st) {
+                (texcoords[0][l], texcoords[1][l]) = (st.x, st.y);
             }
             let patch = surface.patch(prim);
             cluster.place(l, (v, n), &patch, offsets(prim));
@@ -112,31 +111,33 @@ impl Cluster {
         }
     }
 
-    /// The same prisms, the first `count` lanes, over other corners of their triangles.
+    /// The prisms of some lanes (one to eight) over other corners of their triangles.
     pub fn moved(
         &self,
         surface: &DisplacedSurface,
-        count: usize,
+        lanes: &[usize],
         corners: impl Fn(u32) -> TriangleCorners,
     ) -> Self {
-        let copy = |of: &[AtomicU32; LANES]| {
-            std::array::from_fn(|l| AtomicU32::new(of[l].load(Ordering::Relaxed)))
-        };
+        let of_lane = |l: usize| lanes.get(l).copied().unwrap_or(lanes[0]);
+        let of_lanes =
+            |row: &[f32; LANES]| -> [f32; LANES] { std::array::from_fn(|l| row[of_lane(l)]) };
         let mut moved = Self {
-            offsets: [copy(&self.offsets[0]), copy(&self.offsets[1])],
-            prims: copy(&self.prims),
+            texcoords: self
+                .texcoords
+                .each_ref()
+                .map(|st| st.each_ref().map(of_lanes)),
+            offsets: Default::default(),
+            prims: std::array::from_fn(|l| AtomicU32::new(self.flagged(of_lane(l)))),
             ..*self
         };
-        for lane in 0..LANES {
-            // Lanes that are not used repeat the first.
-            let of = if lane < count { lane } else { 0 };
-            let prim = self.prim(of);
+        for (to, &from) in lanes.iter().enumerate() {
+            let prim = self.prim(from);
             let corners = corners(prim);
             let patch = surface.patch_over(prim, corners);
-            let displacements = surface.patch(prim).displacements_of(self.offsets(of));
-            let offsets = patch.offsets_of(displacements);
-            moved.place(lane, corners, &patch, offsets);
+            let displacements = surface.patch(prim).displacements_of(self.offsets(from));
+            moved.place(to, corners, &patch, patch.offsets_of(displacements));
         }
+        // Lanes beyond these are not met: they keep the corners they had, and an empty range of w.
         moved
     }
 

@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::simd::LANES;
 use super::{BoundsChange, Lod, March, MarchError, Parts, PrismHit, PrismOptions, Prisms};
 use crate::ray::{Aabb, Ray};
 use crate::surface::{ClosestPoint, MovingSurface, PointQuery, TexelRect};
@@ -170,7 +171,7 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.intersect(primitive, ray);
         }
-        let hit = self.standing(primitive, ray.time)?.intersect(0, ray)?;
+        let hit = self.standing(primitive, ray)?.intersect(0, ray)?;
         // A triangle may have no area for a moment.
         hit.ng.is_finite().then_some(hit)
     }
@@ -180,7 +181,7 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.occluded(primitive, ray);
         }
-        let standing = self.standing(primitive, ray.time);
+        let standing = self.standing(primitive, ray);
         standing.is_some_and(|prisms| prisms.occluded(0, ray))
     }
 
@@ -190,19 +191,47 @@ impl MovingPrisms {
         self.moving.closest(prims, query)
     }
 
-    /// One primitive's prisms as they stand at a time.
-    fn standing(&self, primitive: u32, time: f32) -> Option<Prisms> {
+    /// The prisms of one primitive that a ray may meet, as they stand at its time.
+    fn standing(&self, primitive: u32, ray: &Ray) -> Option<Prisms> {
         let Parts::Exact(exact) = &self.prisms.parts else {
             return None;
         };
-        let (cluster, lanes) = (
-            &exact.clusters[primitive as usize],
-            exact.len(primitive as usize),
-        );
-        let surface = &self.prisms.surface;
-        let moved = cluster.moved(surface, lanes, |prim| self.moving.corners(prim, time));
-        Some(self.prisms.of_one(moved, lanes))
+        let index = primitive as usize;
+        let cluster = &exact.clusters[index];
+        let (mut met, mut count) = ([0; LANES], 0);
+        for lane in 0..exact.len(index) {
+            let corners = self.moving.positions(cluster.prim(lane), ray.time);
+            let [low, high] = cluster.offsets(lane);
+            // S is no further than |D| <= |w| from the triangle.
+            if may_pass(corners, low.abs().max(high.abs()), ray) {
+                met[count] = lane;
+                count += 1;
+            }
+        }
+        if count == 0 {
+            return None;
+        }
+        let corners = |prim| self.moving.corners(prim, ray.time);
+        let moved = cluster.moved(&self.prisms.surface, &met[..count], corners);
+        Some(self.prisms.of_one(moved, count))
     }
+}
+
+/// Whether a ray may pass within `reach` of the box around a triangle.
+fn may_pass(corners: [Vec3; 3], reach: f32, ray: &Ray) -> bool {
+    let around = corners.into_iter().fold(Aabb::EMPTY, Aabb::including);
+    let around = around.padded(super::BOUNDS_ULPS);
+    let (origin, reach) = (ray.origin.as_dvec3(), f64::from(reach) * 1.000_001);
+    let inverse = ray.direction.as_dvec3().recip();
+    let a = (around.min.as_dvec3() - reach - origin) * inverse;
+    let b = (around.max.as_dvec3() + reach - origin) * inverse;
+    // Of rounding.
+    const SLACK: f64 = 1e-12;
+    let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+    let (tnear, tfar) = (f64::from(ray.tnear), f64::from(ray.tfar));
+    let slack = SLACK * (enter.abs() + leave.abs());
+    // Not what may be NaN: of a ray that starts on a face.
+    !(enter > leave + slack || enter > tfar + slack || leave < tnear - slack)
 }
 
 /// Where D N_a may lie for a coordinate a, D in `range` and N a unit vector along any positive combination m = sum c_j n_j, sum c_j = 1, of

@@ -4,7 +4,7 @@ use std::array;
 
 use glam::Vec3;
 
-use super::Ray;
+use super::{Ray, time_within};
 
 /// Eight rays, one per lane, in arrays that a vector register loads whole.
 ///
@@ -68,7 +68,7 @@ impl RayPacket {
         }
         self.tnear[lane] = ray.tnear;
         self.tfar[lane] = ray.tfar;
-        self.time[lane] = ray.time_within();
+        self.time[lane] = time_within(ray.time);
         self.mask[lane] = ray.mask;
         self.key[lane] = ray.key;
     }

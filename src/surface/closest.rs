@@ -3,9 +3,9 @@
 //! A part of the triangle is a triangle of (u, v) with corners b^k. How near S can come over it is bounded from below by a flat
 //! triangle and by how far S is from that at most ([`Placed`]):
 //!
-//! - **Coarse**, many texels: S = sum beta_k (V_k + w N'_k) with V_k = P(b^k), N'_k = N'(b^k) and w = D/|N'|. The map's min/max
-//!   pyramid has the range of D and so that of w; the flat triangle is the one at the middle of the range, and S is within half the range
-//!   times |N'| of it.
+//! - **Coarse**, many texels: the map's min/max pyramid has the range of D. The flat triangle is that of P + D N at the corners for the D
+//!   at the middle of the range; S is within half the range of it along some N, and by what P + D N of one D bends, as below. Parts
+//!   that are higher than wide are also bounded beside and above.
 //! - **In one texel cell**, where D is bilinear and S smooth: the flat triangle is that of S at the corners. For a function f with
 //!   |f''| <= q(d) along any step d within the triangle, q a quadratic form, Taylor's formula from a point b to the three corners gives
 //!   |f(b) - sum beta_k f(b^k)| <= 1/2 sum beta_k q(b^k - b) = 1/2 sum_{j<k} beta_j beta_k q(b^k - b^j) <= max q(edge) / 6.
@@ -78,9 +78,18 @@ const RELATIVE: f64 = 1e-6;
 /// The same, of the triangle's size.
 const OF_SIZE: f64 = 1e-7;
 
+/// Cuts after which a part is one place: beyond, f64 does not tell texels apart.
+const DEEPEST: u32 = 40;
+
+/// Parts after which the best place so far has to do: far more than any map takes that is not repeated millions of times over a
+/// triangle, until its surface fills the prism.
+const MOST_PARTS: usize = 1 << 18;
+
 /// A part with the least distance that S can have over it.
 struct Candidate {
     below: f64,
+    /// Cuts that it took: of parts with the same bound, zero above all, the smallest goes first, down to places that are near.
+    depth: u32,
     placed: usize,
     part: Part,
 }
@@ -88,7 +97,8 @@ struct Candidate {
 impl Ord for Candidate {
     /// The nearest is the greatest: a heap's first.
     fn cmp(&self, other: &Self) -> Ordering {
-        other.below.total_cmp(&self.below)
+        let by_bound = other.below.total_cmp(&self.below);
+        by_bound.then(self.depth.cmp(&other.depth))
     }
 }
 
@@ -122,7 +132,7 @@ impl Search<'_> {
     }
 
     /// Tries a place, and keeps the part if it may hold a better one.
-    fn add(&mut self, placed: usize, part: Part, least: f64) {
+    fn add(&mut self, placed: usize, part: Part, least: f64, depth: u32) {
         let at = &self.placed[placed];
         let bound = at.bound(&part);
         let below = bound.below.max(least);
@@ -136,6 +146,7 @@ impl Search<'_> {
         }
         self.heap.push(Candidate {
             below,
+            depth,
             placed,
             part,
         });
@@ -143,19 +154,23 @@ impl Search<'_> {
 
     fn run(&mut self) {
         for placed in 0..self.placed.len() {
-            self.add(placed, Part::WHOLE, 0.0);
+            self.add(placed, Part::WHOLE, 0.0, 0);
         }
         let mut pieces = Vec::new();
-        while let Some(Candidate {
-            below,
-            placed,
-            part,
-        }) = self.heap.pop()
-        {
-            if !self.is_lost(placed, below) {
+        for _ in 0..MOST_PARTS {
+            let Some(Candidate {
+                below,
+                depth,
+                placed,
+                part,
+            }) = self.heap.pop()
+            else {
+                return;
+            };
+            if depth < DEEPEST && !self.is_lost(placed, below) {
                 self.placed[placed].cut(&part, &mut pieces);
                 for piece in pieces.drain(..) {
-                    self.add(placed, piece, below);
+                    self.add(placed, piece, below, depth + 1);
                 }
             }
         }
@@ -166,6 +181,9 @@ impl DisplacedSurface {
     /// The nearest point of the displaced surface over these base triangles, no further than the query's radius: none where there is none,
     /// where the query is not [valid](PointQuery::is_valid), or where nothing is nearer than the radius by a millionth of it and a ten
     /// millionth of the triangle's size. The distance is the true one up to the same.
+    ///
+    /// Where a map is repeated more than some hundred thousand times over one triangle the search is given up in time, and the place found so
+    /// far may not be the nearest.
     ///
     /// Walls of closed [`Seams`](super::Seams) are not looked at, nor are places where vertex normals cancel to less than
     /// [`Patch::LEAST_NORMAL`](super::Patch::LEAST_NORMAL). Of several places at the same distance any may be found.

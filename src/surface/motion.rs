@@ -18,6 +18,7 @@ use super::{
     ClosestPoint, DisplacedSurface, InterpolateError, Interpolated, Patch, PointQuery, Seams,
     normals,
 };
+use crate::ray::time_within;
 
 /// The base mesh's vertices at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -139,38 +140,54 @@ impl MovingSurface {
         1 + self.later.len()
     }
 
-    /// The corners of a triangle at a step.
+    /// Positions and normals of all vertices at a step.
+    fn vertices(&self, step: usize) -> (&[Vec3], &[Vec3]) {
+        match step.checked_sub(1) {
+            None => (
+                self.surface.mesh().positions(),
+                self.surface.mesh().normals(),
+            ),
+            Some(k) => (&self.later[k].positions, &self.later[k].normals),
+        }
+    }
+
+    /// The same at the steps before and after a time.
+    fn vertices_around(&self, time: f32) -> [(&[Vec3], &[Vec3]); 2] {
+        let step = self.segment(time).0;
+        [step, (step + 1).min(self.later.len())].map(|step| self.vertices(step))
+    }
+
+    /// Positions and unit normals of a triangle's corners at a step.
     pub(crate) fn corners_of(&self, step: usize, triangle: u32) -> Corners {
-        let mesh = self.surface.mesh();
-        let Some(step) = step.checked_sub(1) else {
-            return (mesh.corners(triangle), mesh.corner_normals(triangle));
-        };
-        let TimeStep { positions, normals } = &self.later[step];
-        let corners = mesh.triangles()[triangle as usize];
+        let (positions, normals) = self.vertices(step);
+        let corners = self.surface.mesh().triangles()[triangle as usize];
         (
             corners.map(|i| positions[i as usize]),
             corners.map(|i| normals[i as usize]),
         )
     }
 
-    /// The corners of a triangle at a time; times outside [0, 1] count as the nearer end, NaN as 0.
-    pub(crate) fn corners(&self, triangle: u32, time: f32) -> Corners {
-        let (step, part) = self.segment(time);
-        let (v, n) = self.corners_of(step, triangle);
-        if part == 0.0 {
-            return (v, n);
-        }
-        let (v1, n1) = self.corners_of(step + 1, triangle);
-        (
-            [0, 1, 2].map(|k| position_between(v[k], v1[k], part)),
-            [0, 1, 2].map(|k| normal_between(n[k], n1[k], part)),
-        )
+    /// The positions of a triangle's corners at a time; times outside [0, 1] count as the nearer end, NaN as 0.
+    #[inline]
+    pub(crate) fn positions(&self, triangle: u32, time: f32) -> [Vec3; 3] {
+        let [(from, _), (to, _)] = self.vertices_around(time);
+        let part = self.segment(time).1;
+        let corners = self.surface.mesh().triangles()[triangle as usize];
+        corners.map(|i| position_between(from[i as usize], to[i as usize], part))
     }
 
-    /// The last step not after a time, and which part of the way to the next one is gone, below 1.
+    /// The same with unit normals.
+    pub(crate) fn corners(&self, triangle: u32, time: f32) -> Corners {
+        let [(_, from), (_, to)] = self.vertices_around(time);
+        let part = self.segment(time).1;
+        let corners = self.surface.mesh().triangles()[triangle as usize];
+        let normals = corners.map(|i| normal_between(from[i as usize], to[i as usize], part));
+        (self.positions(triangle, time), normals)
+    }
+
+    /// The last step not after a time, and which part of the way to the next one is gone: 0 at a step.
     fn segment(&self, time: f32) -> (usize, f64) {
-        // As `Ray::time_within`.
-        let at = f64::from(time.max(0.0).min(1.0)) * self.later.len() as f64;
+        let at = f64::from(time_within(time)) * self.later.len() as f64;
         (at as usize, at.fract())
     }
 
@@ -182,16 +199,8 @@ impl MovingSurface {
 
     /// The surface as it stands at a time: what moving prisms show then. A copy of all vertices.
     pub fn at(&self, time: f32) -> DisplacedSurface {
-        let (step, part) = self.segment(time);
-        let of = |step: usize| match step.checked_sub(1) {
-            None => (
-                self.surface.mesh().positions(),
-                self.surface.mesh().normals(),
-            ),
-            Some(k) => (&self.later[k].positions[..], &self.later[k].normals[..]),
-        };
-        let (v, n) = of(step);
-        let (v1, n1) = if part == 0.0 { (v, n) } else { of(step + 1) };
+        let [(v, n), (v1, n1)] = self.vertices_around(time);
+        let part = self.segment(time).1;
         let positions = v.iter().zip(v1);
         let normals = n.iter().zip(n1);
         self.surface.with_vertices(

@@ -1,13 +1,15 @@
 //! `Prisms::closest` against dense samples of S, refined.
 
-use glam::{Affine3A, DVec3, Mat3A, Quat, Vec3};
+use glam::{Affine3A, DVec3, Mat3A, Quat, Vec2, Vec3};
 use prismarch::prism::{March, Prisms, Step};
-use prismarch::surface::{ClosestPoint, DisplacedSurface, MeshBuilder, PointQuery, Wrap};
+use prismarch::surface::{
+    ClosestPoint, DisplacedSurface, MeshBuilder, PointQuery, UvTransform, Wrap,
+};
 
 use super::common::numbers::Numbers;
 use super::definition::Definition;
 use super::maps;
-use super::meshes::{bent, displaced, flat, torus};
+use super::meshes::{bent, displaced, flat, moved, torus, with_uv};
 use super::surfaces::surfaces;
 
 /// S at a lattice of every triangle.
@@ -264,4 +266,95 @@ fn the_middle_of_a_ball_is_near_all_of_it() {
     )
     .unwrap();
     assert!((found.distance - 1.0).abs() < 2.0 * scale, "{found:?}");
+}
+
+/// Slivers, tiny and huge triangles, far from the origin, and maps repeated until the surface fills its prisms.
+#[test]
+fn hostile_surfaces_have_nearest_points_too() {
+    let repeated = |scale: f32| {
+        let uv = UvTransform {
+            scale: Vec2::splat(scale),
+            ..UvTransform::default()
+        };
+        with_uv(bent(2), maps::white(8, 8, Wrap::Repeat), 0.3, 0.5, uv)
+    };
+    let placed = |scale: Vec3, shift: Vec3, height: f32| {
+        let place = Affine3A::from_scale_rotation_translation(scale, Quat::IDENTITY, shift);
+        displaced(
+            moved(bent(3), place),
+            maps::white(12, 12, Wrap::Clamp),
+            height,
+            0.5,
+        )
+    };
+    let all = [
+        ("repeated 1e3 times", repeated(1e3), Vec3::ZERO, 1.0),
+        ("repeated 1e5 times", repeated(1e5), Vec3::ZERO, 1.0),
+        (
+            "slivers",
+            placed(Vec3::new(1.0, 1e-4, 1.0), Vec3::ZERO, 0.1),
+            Vec3::ZERO,
+            1.0,
+        ),
+        (
+            "tiny",
+            placed(Vec3::splat(1e-6), Vec3::ZERO, 1e-7),
+            Vec3::ZERO,
+            1e-6,
+        ),
+        (
+            "huge",
+            placed(Vec3::splat(1e12), Vec3::ZERO, 1e11),
+            Vec3::ZERO,
+            1e12,
+        ),
+        (
+            "far",
+            placed(Vec3::ONE, Vec3::splat(1e4), 0.1),
+            Vec3::splat(1e4),
+            1.0,
+        ),
+        (
+            "higher than wide",
+            placed(Vec3::splat(1e-3), Vec3::ZERO, 3.0),
+            Vec3::ZERO,
+            1.0,
+        ),
+    ];
+    for (name, surface, middle, size) in all {
+        let prisms = prisms(&surface);
+        let definition = Definition::new(&surface);
+        let mut numbers = Numbers::new(16);
+        for _ in 0..10 {
+            let point = middle + size * numbers.between(0.1, 2.0) * numbers.direction();
+            let found = closest(&prisms, &PointQuery::new(point, f32::INFINITY)).unwrap();
+            let distance = f64::from(found.distance);
+            for _ in 0..3000 {
+                let prim = numbers.below(surface.mesh().triangles().len()) as u32;
+                let (u, v) = numbers.barycentric();
+                let sample = definition.position(prim, u.into(), v.into());
+                let wanted = sample.distance(point.as_dvec3());
+                let limit = wanted * (1.0 + 3e-6) + 1e-6 * f64::from(size);
+                assert!(
+                    distance <= limit,
+                    "{name}: {distance}, but {wanted} is there"
+                );
+            }
+        }
+    }
+}
+
+/// Beyond what numbers can tell apart the search ends all the same.
+#[test]
+fn maps_repeated_beyond_measure_end_the_search() {
+    for scale in [1e9, 1e30] {
+        let uv = UvTransform {
+            scale: Vec2::splat(scale),
+            ..UvTransform::default()
+        };
+        let surface = with_uv(flat(1), maps::white(8, 8, Wrap::Repeat), 0.3, 0.5, uv);
+        let query = PointQuery::new(Vec3::new(0.3, 0.4, 0.5), f32::INFINITY);
+        let found = surface.closest([0], &query).unwrap();
+        assert!(found.distance > 0.3 && found.distance < 0.5, "{found:?}");
+    }
 }

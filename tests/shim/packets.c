@@ -26,6 +26,7 @@ static unsigned packet_tests;
 static void ball_bounds(const void *user, uint32_t prim, uint32_t step, float out[6]) {
   (void)user;
   (void)prim;
+  (void)step;
   for (int k = 0; k < 6; k++)
     out[k] = k < 3 ? -1.001f : 1.001f;
 }

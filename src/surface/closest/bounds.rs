@@ -34,6 +34,9 @@ impl Cell {
     }
 }
 
+/// Of the bound of |N''|.
+const TWO_OVER_ROOT_THREE: f64 = 1.154_700_6;
+
 impl Part {
     /// All of the triangle.
     pub const WHOLE: Self = Self {
@@ -63,7 +66,7 @@ pub struct Placed<'m> {
     pub size: f64,
 }
 
-/// Every product of corners with weights.
+/// At (u, v) of what is linear over the triangle.
 fn weighted(x: &[DVec3; 3], b: DVec2) -> DVec3 {
     x[0] + b.x * (x[1] - x[0]) + b.y * (x[2] - x[0])
 }
@@ -122,7 +125,7 @@ impl<'m> Placed<'m> {
 
     /// How near S may come over a part.
     pub fn bound(&self, part: &Part) -> Bound {
-        let (flat, off) = match &part.cell {
+        let (flat, off, least) = match &part.cell {
             None => self.coarse(part),
             Some(cell) => self.fine(part, cell),
         };
@@ -130,7 +133,7 @@ impl<'m> Placed<'m> {
         let [a, b, c] = part.corners;
         let place = (p * a + q * b + r * c).max(DVec2::ZERO);
         Bound {
-            below: distance - off,
+            below: (distance - off).max(least),
             place: place / (place.x + place.y).max(1.0),
         }
     }
@@ -139,37 +142,40 @@ impl<'m> Placed<'m> {
         part.corners.map(|b| self.patch.texel(b.x, b.y))
     }
 
-    /// The triangle at the middle of the range of w, and how far S is from it at most.
-    fn coarse(&self, part: &Part) -> ([DVec3; 3], f64) {
+    /// The triangle at the middle of the range of D, how far S is from it at most, and another bound of how near S may come.
+    fn coarse(&self, part: &Part) -> ([DVec3; 3], f64, f64) {
         let (raw, least) = self.raw_normals(part);
-        let most = largest(raw.map(DVec3::length)).max(least);
         let [a, b, c] = self.texels(part);
         let heights = self
             .patch
             .map
             .range_in_box(a.min(b).min(c), a.max(b).max(c));
         let [low, high] = self.patch.displacements(heights);
-        let (low, high) = (
-            (low / least).min(low / most),
-            (high / least).max(high / most),
-        );
-        let middle = 0.5 * (low + high);
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let flat = self.at_corners(part, raw, [middle; 3]);
+        let turn = over_edges(raw, DVec3::distance) / least;
+        let off = self.stretch * TWO_OVER_ROOT_THREE * middle.abs() * turn * turn / 6.0;
+
+        // From the flat triangle S goes `half` along some N at most, and by `off` anywhere. Across the mean direction of N the
+        // first is little: high and narrow parts are no nearer than seen along it.
         let normals = part.corners.map(|b| weighted(&self.normals, b));
-        let at = |k: usize| weighted(&self.vertices, part.corners[k]) + middle * normals[k];
-        let longest = largest(normals.map(DVec3::length));
-        ([at(0), at(1), at(2)], 0.5 * (high - low) * longest)
+        let axis = (normals[0] + normals[1] + normals[2]).normalize_or_zero();
+        let across = |v: DVec3| v - axis * axis.dot(v);
+        let lean = largest(normals.map(|n| across(n).length())) / least;
+        let (aside, _) = nearest_on_triangle(flat.map(across));
+        let aside = (aside - half * lean - off).max(0.0);
+        let heights = flat.map(|v| v.dot(axis));
+        let (low, high) = (-largest(heights.map(|h| -h)), largest(heights));
+        let reach = self.stretch * half + off;
+        let above = (low - reach).max(-high - reach).max(0.0);
+        (flat, reach, aside.hypot(above))
     }
 
-    /// The triangle through S at the corners, and how far S is from it at most.
-    fn fine(&self, part: &Part, cell: &Cell) -> ([DVec3; 3], f64) {
+    /// The same of the triangle through S at the corners, without the other bound.
+    fn fine(&self, part: &Part, cell: &Cell) -> ([DVec3; 3], f64, f64) {
         let (raw, least) = self.raw_normals(part);
         let texels = self.texels(part);
         let displacements = texels.map(|texel| cell.displacement(texel));
-        let at = |k: usize| {
-            let w = displacements[k] / raw[k].length().max(Patch::LEAST_NORMAL);
-            let b = part.corners[k];
-            weighted(&self.vertices, b) + w * weighted(&self.normals, b)
-        };
         let across = over_edges(texels, |a, b| (a.x - b.x).abs());
         let up = over_edges(texels, |a, b| (a.y - b.y).abs());
         let twist = (cell.d[3] * across * up).abs();
@@ -177,9 +183,18 @@ impl<'m> Placed<'m> {
         let rise = a.max(b).max(c).dot(DVec2::new(across, up));
         let turn = over_edges(raw, DVec3::distance) / least;
         let reach = largest(displacements.map(f64::abs)) + twist;
-        const TWO_OVER_ROOT_THREE: f64 = 1.154_700_6;
         let second = 2.0 * twist + 2.0 * rise * turn + TWO_OVER_ROOT_THREE * reach * turn * turn;
-        ([at(0), at(1), at(2)], self.stretch * second / 6.0)
+        let flat = self.at_corners(part, raw, displacements);
+        (flat, self.stretch * second / 6.0, 0.0)
+    }
+
+    /// P + D N at the corners of a part, where N' is `raw`.
+    fn at_corners(&self, part: &Part, raw: [DVec3; 3], displacements: [f64; 3]) -> [DVec3; 3] {
+        [0, 1, 2].map(|k| {
+            let w = displacements[k] / raw[k].length().max(Patch::LEAST_NORMAL);
+            let b = part.corners[k];
+            weighted(&self.vertices, b) + w * weighted(&self.normals, b)
+        })
     }
 
     /// Parts that make up a part.

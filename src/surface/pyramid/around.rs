@@ -25,14 +25,14 @@ impl DisplacementMap {
 
     fn range_of_texels(&self, first: DVec2, last: DVec2) -> (f32, f32) {
         let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-        let mut at = first;
-        while at.y <= last.y {
-            while at.x <= last.x {
+        // Counted: far out a coordinate is its own successor.
+        let count = last - first;
+        for j in 0..=count.y as usize {
+            for i in 0..=count.x as usize {
+                let at = first + DVec2::new(i as f64, j as f64);
                 let height = self.sample(at).height as f32;
                 range = (range.0.min(height), range.1.max(height));
-                at.x += 1.0;
             }
-            at = DVec2::new(first.x, at.y + 1.0);
         }
         range
     }
