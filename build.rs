@@ -194,6 +194,12 @@ mod embree {
         let lib = embree.lib.display();
         println!("cargo::rustc-link-search=native={lib}");
         println!("cargo::rustc-link-lib=embree{}", embree.major);
+        // Until 1.0 every minor version may break what was linked.
+        if env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "linux") {
+            let [major, minor] = ["MAJOR", "MINOR"]
+                .map(|part| env::var(format!("CARGO_PKG_VERSION_{part}")).unwrap_or_default());
+            println!("cargo::rustc-cdylib-link-arg=-Wl,-soname,libprismarch.so.{major}.{minor}");
+        }
         // A prefix of the user's own is not on the loader's path.
         if env::var_os("EMBREE_DIR").is_some() {
             println!("cargo::rustc-link-arg=-Wl,-rpath,{lib}");

@@ -79,7 +79,11 @@ pub unsafe extern "C" fn prismarch_closest(
             }
             let (found, out) = (output(found, "found")?, output(point, "point")?);
             let position = Vec3::from_array(position.cast::<[f32; 3]>().read_unaligned());
-            if !position.is_finite() || !(radius >= 0.0) || !(0.0..=1.0).contains(&time) {
+            if !position.is_finite()
+                || radius.is_nan()
+                || radius < 0.0
+                || !(0.0..=1.0).contains(&time)
+            {
                 return Err(Failure::argument(format!(
                     "position {position}, radius {radius}, time {time}; expected finite numbers, at least 0, and 0 to 1"
                 )));
