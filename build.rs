@@ -51,6 +51,12 @@ mod embree {
             println!("cargo::rerun-if-changed={file}");
         }
         let embree = find()?;
+        if env::var_os("CARGO_FEATURE_EMBREE4_SYS").is_some() && embree.major != 4 {
+            return Err(format!(
+                "the feature embree4-sys needs Embree 4; found Embree {}",
+                embree.version
+            ));
+        }
         let config = header(&embree.include, embree.major);
         println!("cargo::rerun-if-changed={}", config.display());
         println!("cargo::rustc-env=PRISMARCH_EMBREE={}", embree.version);

@@ -20,6 +20,8 @@ mod filter;
 mod geometry;
 mod grids;
 mod instance;
+#[cfg(feature = "embree4-sys")]
+mod interop;
 mod prisms;
 pub mod raw;
 mod scene;
