@@ -20,7 +20,7 @@ use super::stats::{Clock, Seconds, Stats};
 use crate::image::atomic;
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
 use crate::render::{Control, Outcome, RenderInput};
-use crate::scene::{AovSet, Film, Integrator, Loaded, Scene};
+use crate::scene::{Aov, AovSet, Film, Integrator, Loaded, Scene, View};
 use crate::trace::World;
 
 /// Render a scene file to a picture
@@ -200,6 +200,8 @@ impl Job<'_> {
         if !self.target.keeps_all() {
             // Nobody would see them.
             scene.film.aovs = AovSet::NONE;
+        } else if scene.integrator == Integrator::View(View::Cost) {
+            scene.film.aovs = scene.film.aovs.with(Aov::Cost);
         }
         let film = &scene.film;
         let samples = self.samples(film)?;

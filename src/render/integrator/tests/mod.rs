@@ -18,11 +18,12 @@ use crate::surface::{
 use crate::trace::{Hit, Object, PlacedObject, Placement, Shape, World};
 
 mod glass;
+mod lights;
 mod setting;
 mod shapes;
 
 use setting::Scene;
-use shapes::{ball, built, displaced_ball, quad, slab, waves};
+use shapes::{ball, built, displaced, displaced_ball, quad, quad_mesh, slab, waves};
 
 /// A lamp that shines nothing: without any, the world would be white.
 fn dark_room() -> Vec<Light> {
