@@ -57,7 +57,7 @@ impl<'a> Stage<'a> {
             materials: input.materials,
             object_materials: input.object_materials,
             offset: RayOffset::for_scene(input.tracer.bounds().diagonal()),
-            has_holes: input.materials.iter().any(|m| !m.opacity.is(1.0)),
+            has_holes: input.materials.iter().any(Material::has_holes),
             cone: Cone::from_eye(input.camera.pixel_spread(input.film.height)),
         }
     }
@@ -189,9 +189,8 @@ impl<'a> Stage<'a> {
             let askew = direction.normalize() + Vec3::new(0.013, 0.027, -0.019);
             let met = self.meet(&Ray::new(position, askew.normalize()), &Cone::default())?;
             let here = self.surfaces.object(&met.hit);
-            let shut = !met.from_outside
-                && !met.material.is_transmissive()
-                && met.material.opacity.is(1.0);
+            let shut =
+                !met.from_outside && !met.material.is_transmissive() && !met.material.has_holes();
             if !shut || object.is_some_and(|o| o != here) {
                 return None;
             }
@@ -202,7 +201,7 @@ impl<'a> Stage<'a> {
 
     /// Whether the ray slips through a hole; the number of its surface so far keeps choices apart.
     pub fn slips(&self, met: &Met, crossing: u32, sampler: &Sampler) -> bool {
-        if met.material.opacity.is(1.0) {
+        if !met.material.has_holes() {
             return false;
         }
         let dimension = Dimension::new(crossing, Purpose::Opacity);
