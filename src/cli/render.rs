@@ -181,6 +181,7 @@ impl Job<'_> {
             mrays_per_second: outcome.rays.total() as f64 / render.max(1e-9) / 1e6,
             dropped_samples: frame.dropped(),
             memory: Memory::of(&loaded, &world, engine.tracer()),
+            peak_memory: super::memory::peak(),
         };
         if let Some(path) = self.stats {
             stats.write(path)?;
