@@ -21,6 +21,20 @@ pub fn count() {
 /// A step is one look into the displacement map, which asks about eight places at once: of the exact march seven children of
 /// a span (15 take two steps) or up to eight texel cells, of the uniform march eight of its samples. What is decided in f64 is
 /// not counted, nor are the uniform march's bent prisms, which take another route.
+///
+/// ```
+/// use prismarch::prism::count_steps;
+/// use prismarch::ray::Ray;
+/// use prismarch::trace::Tracer;
+///
+/// /// Steps from the ray's origin to its hit, through a world of counting prisms: the same for every backend.
+/// fn cost(tracer: &dyn Tracer, ray: &Ray) -> u64 {
+///     let tfar = tracer.intersect(ray).map_or(ray.tfar, |hit| hit.t);
+///     // Nothing is hit before the hit, so all that lies before it is marched.
+///     let (_, steps) = count_steps(|| tracer.intersect(&Ray { tfar, ..*ray }));
+///     steps
+/// }
+/// ```
 pub fn count_steps<R>(call: impl FnOnce() -> R) -> (R, u64) {
     let before = STEPS.get();
     let returned = call();

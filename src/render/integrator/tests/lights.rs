@@ -8,7 +8,7 @@ use crate::trace::RayOffset;
 /// Samples from the origin, one light per point, against the sum of the densities of all that lies in a direction.
 fn follows(what: &str, scene: &Scene, cap: Cap) {
     let fineness = Fineness {
-        samples: 40_000,
+        samples: 200_000,
         cells: [16, 10],
         points: 24,
     };
