@@ -438,3 +438,47 @@ fn a_full_disk_leaves_the_old_file() {
     assert_eq!(output.status.code(), Some(4), "{}", stderr(&output));
     assert_eq!(std::fs::read(folder.path("a.exr")).unwrap(), before);
 }
+
+#[cfg(feature = "embree")]
+#[test]
+fn the_cost_is_counted_alike_by_every_backend_and_number_of_threads() {
+    let folder = folder();
+    let render = |name: &str, options: &str| {
+        let what = format!("render scene.toml -o {name}.exr --integrator cost{options}");
+        done(&folder, &what);
+        pixels(&folder, &format!("{name}.exr")).1
+    };
+    let costs = |pixels: &BTreeMap<String, Vec<u32>>| -> Vec<f32> {
+        pixels["cost"].iter().copied().map(f32::from_bits).collect()
+    };
+    for march in ["", " --march uniform --dt 0.25"] {
+        let one = render("one", &format!("{march} --threads 1"));
+        assert!(one == render("two", &format!("{march} --threads 2")));
+        // Of a plane's two triangles Embree may name the other one on the diagonal, but the work is the same.
+        let bvh = render("bvh", &format!("{march} --backend bvh"));
+        for channel in ["R", "G", "B", "cost"] {
+            assert!(one[channel] == bvh[channel], "{march} {channel}");
+        }
+        let costs = costs(&one);
+        assert!(costs.iter().all(|cost| (0.0..1000.0).contains(cost)));
+        assert!(costs.iter().any(|&cost| cost > 1.0));
+    }
+    done(&folder, "render scene.toml -o beauty.exr");
+    assert!(!pixels(&folder, "beauty.exr").1.contains_key("cost"));
+    done(
+        &folder,
+        "render scene.toml -o a.exr --integrator cost --samples 0..6",
+    );
+    done(
+        &folder,
+        "render scene.toml -o b.exr --integrator cost --samples 6..12",
+    );
+    done(&folder, "merge a.exr b.exr -o merged.exr");
+    let exact = render("exact", "");
+    for (a, b) in costs(&pixels(&folder, "merged.exr").1)
+        .iter()
+        .zip(costs(&exact))
+    {
+        assert!((a - b).abs() <= 1e-5 * b, "{a} {b}");
+    }
+}

@@ -72,6 +72,14 @@ impl Memory {
     }
 }
 
+/// The most bytes that this process has had in memory so far; `None` where the system is not Linux, which does not tell.
+pub fn peak() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(1024 * kibibytes)
+}
+
 fn map_bytes(loaded: &Loaded) -> usize {
     loaded.maps.iter().map(|m| m.map.bytes()).sum()
 }

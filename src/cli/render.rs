@@ -20,7 +20,7 @@ use super::stats::{Clock, Seconds, Stats};
 use crate::image::atomic;
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
 use crate::render::{Control, Outcome, RenderInput};
-use crate::scene::{AovSet, Film, Integrator, Loaded, Scene};
+use crate::scene::{Aov, AovSet, Film, Integrator, Loaded, Scene, View};
 use crate::trace::World;
 
 /// Render a scene file to a picture
@@ -181,6 +181,7 @@ impl Job<'_> {
             mrays_per_second: outcome.rays.total() as f64 / render.max(1e-9) / 1e6,
             dropped_samples: frame.dropped(),
             memory: Memory::of(&loaded, &world, engine.tracer()),
+            peak_memory: super::memory::peak(),
         };
         if let Some(path) = self.stats {
             stats.write(path)?;
@@ -200,6 +201,8 @@ impl Job<'_> {
         if !self.target.keeps_all() {
             // Nobody would see them.
             scene.film.aovs = AovSet::NONE;
+        } else if scene.integrator == Integrator::View(View::Cost) {
+            scene.film.aovs = scene.film.aovs.with(Aov::Cost);
         }
         let film = &scene.film;
         let samples = self.samples(film)?;

@@ -33,6 +33,8 @@ pub struct Stats {
     pub mrays_per_second: f64,
     pub dropped_samples: u64,
     pub memory: Memory,
+    /// The most bytes that the whole process had in memory; only Linux tells.
+    pub peak_memory: Option<u64>,
 }
 
 /// Wall-clock time by phase.

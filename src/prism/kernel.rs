@@ -57,6 +57,25 @@ macro_rules! stamps {
 }
 
 impl Kernel {
+    /// The kernel that counts its steps: at the baseline, so that all machines count the same.
+    pub fn counting(march: March) -> Self {
+        let (intersect, occluded): (Intersect, Occluded) = match march {
+            March::Exact => (
+                exact::intersect::<Portable<true>>,
+                exact::occluded::<Portable<true>>,
+            ),
+            March::Uniform { .. } => (
+                uniform::intersect::<Portable<true>>,
+                uniform::occluded::<Portable<true>>,
+            ),
+        };
+        Self {
+            level: SimdLevel::Baseline,
+            intersect,
+            occluded,
+        }
+    }
+
     /// The kernel of `level`, or of the baseline where the machine lacks it.
     pub fn new(march: March, level: SimdLevel) -> Self {
         let level = if level.is_supported() {

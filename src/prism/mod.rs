@@ -25,6 +25,7 @@ mod seam_tests;
 mod sides;
 mod sight;
 mod simd;
+mod steps;
 #[cfg(test)]
 mod tests;
 mod touch;
@@ -48,6 +49,7 @@ pub use explain::{CurvePoint, Explanation, Fate, SpanChild};
 pub use march::{March, MarchError, Step};
 pub use motion::MovingPrisms;
 pub use simd::SimdLevel;
+pub use steps::count_steps;
 
 /// Where a ray first meets the surface inside one prism.
 #[derive(Clone, Copy, Debug, PartialEq)]

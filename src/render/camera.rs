@@ -115,7 +115,7 @@ fn concentric_disk(u: Vec2) -> Vec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::testing::Random;
+    use crate::render::testing::{Fineness, Random, assert_samples_follow};
 
     fn camera() -> Camera {
         Camera {
@@ -232,6 +232,61 @@ mod tests {
                 mean += on_lens / 2000.0;
             }
             assert!(mean.length() < 0.03, "{mean}");
+        }
+    }
+
+    #[test]
+    fn the_aperture_is_sampled_uniformly_by_chi_square() {
+        let fineness = Fineness {
+            samples: 40_000,
+            cells: [14, 14],
+            points: 32,
+        };
+        for blades in [0, 3, 5, 6, 11] {
+            let lens = Lens {
+                radius: 0.5,
+                focus: 4.0,
+                blades,
+                rotation: 0.3,
+            };
+            let camera = Camera {
+                lens: Some(lens),
+                ..camera()
+            };
+            let eye = Eye::new(&camera, 200, 100);
+            let sides = if blades == 0 { 1 } else { blades };
+            let turn = TAU / sides as f32;
+            // Half planes: where the middle of each side is, and how far out.
+            let [reach, area] = match blades {
+                0 => [1.0, PI],
+                n => [(0.5 * turn).cos(), 0.5 * n as f32 * turn.sin()],
+            };
+            let is_inside = |at: Vec2| {
+                let sides = (0..sides).map(|k| lens.rotation + (k as f32 + 0.5) * turn);
+                match blades {
+                    0 => at.length() <= reach,
+                    _ => sides
+                        .into_iter()
+                        .all(|angle| at.dot(Vec2::from_angle(angle)) <= reach),
+                }
+            };
+            assert_samples_follow(
+                &format!("{blades} blades"),
+                fineness,
+                |random| {
+                    let origin = eye.ray(Vec2::new(40.0, 80.0), random.point()).origin;
+                    let at = (origin - camera.position).truncate() / lens.radius;
+                    Some(0.5 * (at + 1.0))
+                },
+                // The square covers an area of 4.
+                |at| {
+                    if is_inside(2.0 * at - 1.0) {
+                        4.0 / area
+                    } else {
+                        0.0
+                    }
+                },
+            );
         }
     }
 }

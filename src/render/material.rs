@@ -38,5 +38,10 @@ pub fn emission(material: &Material, point: &SurfacePoint) -> Vec3 {
 
 /// The part of rays that meet the surface at `point`.
 pub fn opacity(material: &Material, point: &SurfacePoint) -> f32 {
-    material.opacity.at(point).clamp(0.0, 1.0)
+    let opacity = material.opacity.at(point).clamp(0.0, 1.0);
+    match material.opacity_cutoff {
+        Some(cutoff) if opacity >= cutoff => 1.0,
+        Some(_) => 0.0,
+        None => opacity,
+    }
 }

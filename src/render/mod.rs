@@ -111,8 +111,8 @@ pub struct RenderInput<'a> {
     pub integrator: &'a Integrator,
 }
 
-/// The opaque object, if any, that the camera of `input` is inside of: its inner side is all that is seen in any
-/// direction.
+/// The opaque closed object, if any, that the camera of `input` is inside of and would see nothing for: it is left once more than it is
+/// entered in any direction, and either all light comes from outside of the scene, or its inner side is all that is seen.
 pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
     integrator::enclosing_object(input)
 }

@@ -188,10 +188,12 @@ pub enum Aov {
     Prim,
     /// `variance.R` `.G` `.B`: variance of one sample.
     Variance,
+    /// `cost`: steps of the march. Not to be asked for: pictures of the [cost view](super::View::Cost) have it, and no others.
+    Cost,
 }
 
 impl Aov {
-    /// Every AOV under the name that scene files and options have for it.
+    /// Every AOV that can be asked for, under the name that scene files and options have for it.
     pub const NAMES: &'static [(&'static str, Self)] = &[
         ("albedo", Self::Albedo),
         ("N", Self::Normal),
@@ -203,6 +205,9 @@ impl Aov {
         ("prim", Self::Prim),
         ("variance", Self::Variance),
     ];
+
+    /// The name of the one that cannot.
+    const COST: (&'static str, Self) = ("cost", Self::Cost);
 }
 
 /// A set of AOVs.
@@ -213,7 +218,7 @@ impl AovSet {
     /// None.
     pub const NONE: Self = Self(0);
 
-    /// All of them.
+    /// All that can be asked for.
     pub const ALL: Self = Self((1 << Aov::NAMES.len()) - 1);
 
     /// With one more.
@@ -225,13 +230,24 @@ impl AovSet {
     pub const fn has(self, aov: Aov) -> bool {
         self.0 >> aov as u16 & 1 == 1
     }
+
+    /// The set that is displayed like this, if any is.
+    pub(crate) fn parse(names: &str) -> Option<Self> {
+        let known = |name: &str| Self::named().find(|(known, _)| *known == name);
+        let aovs = names.split_ascii_whitespace();
+        aovs.map(|name| Some(known(name)?.1)).collect()
+    }
+
+    fn named() -> impl Iterator<Item = (&'static str, Aov)> {
+        Aov::NAMES.iter().copied().chain([Aov::COST])
+    }
 }
 
 /// Their names, with spaces between.
 impl fmt::Display for AovSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let aovs = Aov::NAMES.iter().filter(|(_, aov)| self.has(*aov));
-        let names: Vec<&str> = aovs.map(|(name, _)| *name).collect();
+        let aovs = Self::named().filter(|(_, aov)| self.has(*aov));
+        let names: Vec<&str> = aovs.map(|(name, _)| name).collect();
         f.write_str(&names.join(" "))
     }
 }
@@ -319,6 +335,20 @@ mod tests {
         let apart = window.intersection(&Window::whole(1, 9));
         assert_eq!(apart.pixels(), 0);
         assert_eq!(Window::whole(1, 1).union(&window), Window::whole(5, 5));
+    }
+
+    #[test]
+    fn sets_are_read_as_they_are_shown() {
+        for set in [
+            AovSet::NONE,
+            AovSet::ALL,
+            AovSet::ALL.with(Aov::Cost),
+            AovSet::NONE.with(Aov::Cost),
+        ] {
+            assert_eq!(AovSet::parse(&set.to_string()), Some(set));
+        }
+        assert_eq!(AovSet::parse("N speed"), None);
+        assert!(!AovSet::ALL.has(Aov::Cost));
     }
 
     #[test]

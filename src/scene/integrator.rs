@@ -41,7 +41,7 @@ impl Default for PathLimits {
     }
 }
 
-/// What a view shows of the first hit. Where there is none, all are black.
+/// What a view shows of the first hit. Where there is none, all but [`Self::Cost`] are black.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// The shading normal: (n + 1) / 2.
@@ -58,6 +58,7 @@ pub enum View {
     Displacement,
     /// A colour per base triangle.
     Prim,
-    /// What the ray costs to trace, as a heat map: a measured time, the only view that is not the same in every run.
+    /// Steps of the march from the ray's origin to its hit ([`count_steps`](crate::prism::count_steps)), as a heat map. Prisms must be made
+    /// [to count them](crate::prism::Prisms::counting_steps), as [`Scene::world`](super::Scene::world) does for this view.
     Cost,
 }

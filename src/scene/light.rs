@@ -91,3 +91,16 @@ pub enum Light {
         irradiance: Vec3,
     },
 }
+
+impl Light {
+    /// Whether it comes from outside of the scene, so that what is closed keeps it out.
+    pub fn is_distant(&self) -> bool {
+        matches!(
+            self,
+            Self::Sun { .. }
+                | Self::Sky { .. }
+                | Self::Environment { .. }
+                | Self::Directional { .. }
+        )
+    }
+}

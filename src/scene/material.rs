@@ -183,6 +183,8 @@ pub struct Material {
     pub emission_strength: f32,
     /// 0 is a hole.
     pub opacity: Scalar,
+    /// Where it is given, an opacity from it on counts as 1, and one below as 0.
+    pub opacity_cutoff: Option<f32>,
     /// Normal or bump map.
     pub detail: Option<Detail>,
 }
@@ -208,6 +210,7 @@ impl Default for Material {
             emission: Color::Constant(Vec3::ZERO),
             emission_strength: 1.0,
             opacity: Scalar::Constant(1.0),
+            opacity_cutoff: None,
             detail: None,
         }
     }
@@ -217,6 +220,14 @@ impl Material {
     /// Whether rays go through it as through glass. Holes do not count.
     pub fn is_transmissive(&self) -> bool {
         !self.transmission.is(0.0)
+    }
+
+    /// Whether there may be points at which not all rays meet it.
+    pub fn has_holes(&self) -> bool {
+        match (&self.opacity, self.opacity_cutoff) {
+            (Scalar::Constant(x), Some(cutoff)) => *x < cutoff,
+            (opacity, _) => !opacity.is(1.0),
+        }
     }
 
     /// The pictures it reads: an address each, the same for shared ones, and the bytes held there.

@@ -6,14 +6,16 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use glam::Vec4;
 
 use super::{Grid, LANES, Lanes, Task};
+use crate::prism::steps;
 use crate::surface::{Level, StoredTexels, Texel};
 
+/// `COUNTED`: every look into a map counts as a step of the march.
 #[derive(Clone, Copy)]
-pub struct Portable(Vec4, Vec4);
+pub struct Portable<const COUNTED: bool = false>(Vec4, Vec4);
 
 macro_rules! lanewise {
     ($operator:ident, $method:ident) => {
-        impl $operator for Portable {
+        impl<const COUNTED: bool> $operator for Portable<COUNTED> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -28,7 +30,7 @@ lanewise!(Sub, sub);
 lanewise!(Mul, mul);
 lanewise!(Div, div);
 
-impl Lanes for Portable {
+impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     type Quad = super::quad::PortableQuad;
 
     #[inline(never)]
@@ -126,6 +128,9 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn block_ranges(level: &Level, i: Self, j: Self) -> [Self; 2] {
+        if COUNTED {
+            steps::count();
+        }
         let (i, j) = (i.to_array(), j.to_array());
         let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
@@ -139,18 +144,27 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4] {
-        match grid.texels {
+        if COUNTED {
+            steps::count();
+        }
+        let (i, j) = (i.to_array(), j.to_array());
+        let corners = match grid.texels {
             StoredTexels::U8(t) => corners::<u8>(t, grid, i, j),
             StoredTexels::U16(t) => corners::<u16>(t, grid, i, j),
             StoredTexels::F32(t) => corners::<f32>(t, grid, i, j),
-        }
+        };
+        corners.map(Self::from_array)
     }
 }
 
 #[inline(always)]
-fn corners<T: Texel>(t: &[T::Atomic], grid: &Grid<'_>, i: Portable, j: Portable) -> [Portable; 4] {
+fn corners<T: Texel>(
+    t: &[T::Atomic],
+    grid: &Grid<'_>,
+    i: [f32; LANES],
+    j: [f32; LANES],
+) -> [[f32; LANES]; 4] {
     let [width, height] = grid.size;
-    let (i, j) = (i.to_array(), j.to_array());
     let mut out = [[0.0; LANES]; 4];
     for l in 0..LANES {
         // `as usize` turns NaN and negatives into 0.
@@ -166,10 +180,5 @@ fn corners<T: Texel>(t: &[T::Atomic], grid: &Grid<'_>, i: Portable, j: Portable)
         out[2][l] = T::load(&top[0]).into();
         out[3][l] = T::load(&top[1]).into();
     }
-    [
-        Portable::from_array(out[0]),
-        Portable::from_array(out[1]),
-        Portable::from_array(out[2]),
-        Portable::from_array(out[3]),
-    ]
+    out
 }

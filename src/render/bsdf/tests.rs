@@ -1,5 +1,5 @@
 use super::*;
-use crate::render::testing::{Random, assert_chi_square};
+use crate::render::testing::{Cap, Fineness, Random};
 
 fn base() -> Parameters {
     Parameters {
@@ -175,23 +175,11 @@ fn reciprocal() {
 
 #[test]
 fn samples_follow_their_density_by_chi_square() {
-    const N: u32 = 40_000;
-    const ROWS: usize = 20;
-    const COLUMNS: usize = 12;
-    /// Density is summed over this many points along each side of a cell.
-    const FINE: usize = 12;
-    let cell = |d: Vec3| {
-        let row = ((0.5 * (d.z + 1.0) * ROWS as f32) as usize).min(ROWS - 1);
-        let turns = d.y.atan2(d.x) / TAU + 0.5;
-        (row, ((turns * COLUMNS as f32) as usize).min(COLUMNS - 1))
+    let fineness = Fineness {
+        samples: 40_000,
+        cells: [12, 20],
+        points: 12,
     };
-    let direction = |row: f32, column: f32| {
-        let z = 2.0 * row / ROWS as f32 - 1.0;
-        let (sin, cos) = ((column / COLUMNS as f32 - 0.5) * TAU).sin_cos();
-        let radius = (1.0 - z * z).sqrt();
-        Vec3::new(radius * cos, radius * sin, z)
-    };
-    let solid_angle = 4.0 * std::f64::consts::PI / (ROWS * COLUMNS * FINE * FINE) as f64;
     for (index, (name, p)) in white().into_iter().enumerate() {
         // Narrow lobes need finer sums than a test has time for; their code is the same.
         if p.alpha < 0.05 || (p.coat > 0.0 && p.coat_alpha < 0.05) {
@@ -209,27 +197,16 @@ fn samples_follow_their_density_by_chi_square() {
             _ => Allowed::ALL,
         };
         let bsdf = Bsdf::new(p, viewer(0.9));
-        let mut random = Random::new(index as u64 + 1);
-        let mut counts = [[0_u32; COLUMNS]; ROWS];
-        for _ in 0..N {
-            let choice = random.number();
-            if let Some(sample) = bsdf.sample(choice, random.point(), allowed) {
-                let (row, column) = cell(sample.direction);
-                counts[row][column] += 1;
-            }
-        }
-        let fine = |i: usize| (i as f32 + 0.5) / FINE as f32;
-        let expected = |row: usize, column: usize| {
-            let points = (0..FINE * FINE)
-                .map(|i| direction(row as f32 + fine(i / FINE), column as f32 + fine(i % FINE)));
-            let sum: f64 = points
-                .map(|d| f64::from(bsdf.evaluate(d, allowed).pdf))
-                .sum();
-            f64::from(N) * solid_angle * sum
-        };
-        let cells = (0..ROWS * COLUMNS).map(|i| (i / COLUMNS, i % COLUMNS));
-        let cells = cells.map(|(row, column)| (counts[row][column], expected(row, column)));
-        assert_chi_square(cells, &name);
+        Cap::sphere(Vec3::Z).assert_samples_follow(
+            &name,
+            fineness,
+            |random| {
+                let choice = random.number();
+                let sample = bsdf.sample(choice, random.point(), allowed)?;
+                Some(sample.direction)
+            },
+            |direction| bsdf.evaluate(direction, allowed).pdf,
+        );
     }
 }
 

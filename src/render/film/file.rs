@@ -120,12 +120,7 @@ fn object_attribute(name: &str) -> String {
 
 fn aovs(path: &Path, attributes: &[(String, String)]) -> Result<AovSet, FrameError> {
     let names = attribute(path, attributes, AOVS)?;
-    let known = |name: &str| Aov::NAMES.iter().find(|(known, _)| *known == name);
-    let aovs = names
-        .split_ascii_whitespace()
-        .map(|name| Some(known(name)?.1));
-    let aovs: Option<AovSet> = aovs.collect();
-    aovs.ok_or_else(|| FrameError::Attribute {
+    AovSet::parse(names).ok_or_else(|| FrameError::Attribute {
         path: path.to_owned(),
         name: AOVS.into(),
         found: format!("{names:?}"),

@@ -1,7 +1,7 @@
 //! One pixel: sums over its samples, in f64, that can be put down and taken up again at any sample.
 
 use super::sample::{CameraSample, FirstHit};
-use super::slot::{ALL, DEVIATIONS, Kind, MEANS, SLOTS};
+use super::slot::{ALL, COST, DEVIATIONS, Kind, MEANS, SLOTS};
 
 /// Objects that a pixel can hold: two per Cryptomatte layer.
 pub const OBJECTS: usize = 6;
@@ -76,6 +76,7 @@ impl Pixel {
         for (sum, x) in self.sums.iter_mut().zip(radiance) {
             *sum += sign * x;
         }
+        self.sums[COST] += sign * f64::from(sample.cost);
         self.deviate(radiance);
         if let Some(hit) = &sample.first {
             self.add_hit(hit, sign, depth, object);
@@ -222,6 +223,7 @@ mod tests {
         let x = (i.wrapping_mul(0x9e37_79b9) >> 8) as f32 / (1 << 24) as f32;
         CameraSample {
             radiance: Vec3::new(x, 3.0 * x * x, 1.0 - x),
+            cost: i,
             first: (!i.is_multiple_of(3)).then_some(FirstHit {
                 albedo: Vec3::splat(x),
                 normal: Vec3::Y,

@@ -9,6 +9,8 @@ pub struct CameraSample {
     pub radiance: Vec3,
     /// The first thing that the ray met; `None` for nothing. What is not finite in it counts as 0.
     pub first: Option<FirstHit>,
+    /// Steps of the march; 0 where none are counted.
+    pub cost: u32,
 }
 
 /// The first thing that a camera ray met.
@@ -36,6 +38,7 @@ impl CameraSample {
         Self {
             radiance,
             first: None,
+            cost: 0,
         }
     }
 }

@@ -28,13 +28,15 @@ pub struct Slot {
 
 /// Number of sums.
 pub const SLOTS: usize = ALL.len();
+/// The place of the cost in [`ALL`].
+pub const COST: usize = 17;
 /// The place of the three means in [`ALL`]; their deviations follow.
-pub const MEANS: usize = 17;
+pub const MEANS: usize = 18;
 /// The place of the squared deviations in [`ALL`].
-pub const DEVIATIONS: usize = 20;
+pub const DEVIATIONS: usize = 21;
 
 /// All sums, in the order of [`super::pixel::Pixel`].
-pub const ALL: [Slot; 23] = {
+pub const ALL: [Slot; 24] = {
     use Kind::{Deviations, Filtered, Mean, OfHits};
     const fn slot(name: &'static str, aov: Option<Aov>, kind: Kind) -> Slot {
         Slot { name, aov, kind }
@@ -57,6 +59,7 @@ pub const ALL: [Slot; 23] = {
         slot("UV.U", Some(Aov::Uv), OfHits),
         slot("UV.V", Some(Aov::Uv), OfHits),
         slot("displacement", Some(Aov::Displacement), OfHits),
+        slot("cost", Some(Aov::Cost), Filtered),
         slot("mean.R", Some(Aov::Variance), Mean),
         slot("mean.G", Some(Aov::Variance), Mean),
         slot("mean.B", Some(Aov::Variance), Mean),

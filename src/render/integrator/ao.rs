@@ -51,6 +51,7 @@ impl Integrator for Ao<'_> {
         CameraSample {
             radiance: Vec3::splat(open),
             first: Some(self.stage.first_hit(&met, &point)),
+            cost: 0,
         }
     }
 }

@@ -63,9 +63,14 @@ pub trait Integrator: Sync {
     fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample;
 }
 
-/// The opaque object that the camera is inside of.
+/// The opaque object that the camera is inside of, where no light can be.
 pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
-    stage::Stage::new(input).enclosing_object(input.camera.position)
+    let is_dark = matches!(
+        input.integrator,
+        scene::Integrator::Path(_) | scene::Integrator::Beauty
+    ) && input.lights.iter().all(scene::Light::is_distant)
+        && !input.materials.iter().any(scene::Material::is_emissive);
+    stage::Stage::new(input).enclosing_object(input.camera.position, !is_dark)
 }
 
 /// The integrator that a scene asks for.

@@ -324,6 +324,7 @@ impl Integrator for Path<'_> {
         CameraSample {
             radiance: walk.radiance,
             first: walk.first,
+            cost: 0,
         }
     }
 }

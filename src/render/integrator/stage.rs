@@ -1,5 +1,7 @@
 //! What all integrators share: hits made ready for shading, and rays that leave them.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 
 use super::super::detail;
@@ -57,7 +59,7 @@ impl<'a> Stage<'a> {
             materials: input.materials,
             object_materials: input.object_materials,
             offset: RayOffset::for_scene(input.tracer.bounds().diagonal()),
-            has_holes: input.materials.iter().any(|m| !m.opacity.is(1.0)),
+            has_holes: input.materials.iter().any(Material::has_holes),
             cone: Cone::from_eye(input.camera.pixel_spread(input.film.height)),
         }
     }
@@ -153,15 +155,22 @@ impl<'a> Stage<'a> {
         }
     }
 
+    /// All that lies along a ray, whatever hides it.
+    fn crossings(&self, ray: Ray) -> impl Iterator<Item = Met<'a>> {
+        let mut ray = ray;
+        let next = move || {
+            let met = self.meet(&ray, &Cone::default())?;
+            ray = self.beyond(&ray, &met);
+            Some(met)
+        };
+        std::iter::from_fn(next).take(MOST_HOLES as usize)
+    }
+
     /// The bodies around a point: those whose inner sides a ray from there to the outside meets.
     pub fn bodies_at(&self, position: Vec3) -> Bodies {
-        let mut ray = Ray::new(position, Vec3::Y);
         let mut entered = Bodies::default();
         let mut around = Vec::new();
-        for _ in 0..MOST_HOLES {
-            let Some(met) = self.meet(&ray, &Cone::default()) else {
-                break;
-            };
+        for met in self.crossings(Ray::new(position, Vec3::Y)) {
             if met.material.is_transmissive() {
                 let after = entered
                     .cross(self.materials, met.index, met.from_outside)
@@ -171,38 +180,59 @@ impl<'a> Stage<'a> {
                 }
                 entered = after;
             }
-            ray = self.beyond(&ray, &met);
         }
         // The outermost was entered first.
         let enter = |bodies: Bodies, index| bodies.cross(self.materials, index, true).beyond;
         around.into_iter().rev().fold(Bodies::default(), enter)
     }
 
-    /// The object whose inner side is met in all of 26 directions from `position`, if it is opaque.
-    pub fn enclosing_object(&self, position: Vec3) -> Option<usize> {
+    /// The opaque object that is around `position`, if any: in all of 26 directions it is left once more than it is entered. Where
+    /// `is_lit`, so that light may be inside with the camera, it must also be all that is seen.
+    pub fn enclosing_object(&self, position: Vec3, is_lit: bool) -> Option<usize> {
         let steps = [-1.0, 0.0, 1.0];
         let all = steps.map(|x| steps.map(|y| steps.map(|z| Vec3::new(x, y, z))));
         let directions = all.into_iter().flatten().flatten();
+        let mut around: Option<Vec<u32>> = None;
         let mut object = None;
         for direction in directions.filter(|d| *d != Vec3::ZERO) {
             // A little askew: rays along the axes of a scene graze its edges.
             let askew = direction.normalize() + Vec3::new(0.013, 0.027, -0.019);
-            let met = self.meet(&Ray::new(position, askew.normalize()), &Cone::default())?;
-            let here = self.surfaces.object(&met.hit);
-            let shut = !met.from_outside
-                && !met.material.is_transmissive()
-                && met.material.opacity.is(1.0);
-            if !shut || object.is_some_and(|o| o != here) {
-                return None;
-            }
-            object = Some(here);
+            let ray = Ray::new(position, askew.normalize());
+            let left = self.left_along(ray, is_lit);
+            let mut both = around
+                .take()
+                .unwrap_or_else(|| left.keys().copied().collect());
+            both.retain(|top| left.contains_key(top));
+            object = both.first().map(|top| left[top]);
+            object?;
+            around = Some(both);
         }
         object
     }
 
+    /// The opaque objects, by the place where they stand, that a ray leaves more often than it enters them. `first_only` leaves out those
+    /// behind the first.
+    fn left_along(&self, ray: Ray, first_only: bool) -> BTreeMap<u32, usize> {
+        let mut places = BTreeMap::new();
+        let mut first = None;
+        for met in self.crossings(ray) {
+            let top = met.hit.top();
+            first.get_or_insert(top);
+            if !met.material.is_transmissive() && !met.material.has_holes() {
+                let (count, _) = places
+                    .entry(top)
+                    .or_insert((0, self.surfaces.object(&met.hit)));
+                *count += if met.from_outside { -1 } else { 1 };
+            }
+        }
+        places.retain(|top, (count, _)| *count > 0 && (!first_only || first == Some(*top)));
+        let objects = places.into_iter().map(|(top, (_, object))| (top, object));
+        objects.collect()
+    }
+
     /// Whether the ray slips through a hole; the number of its surface so far keeps choices apart.
     pub fn slips(&self, met: &Met, crossing: u32, sampler: &Sampler) -> bool {
-        if met.material.opacity.is(1.0) {
+        if !met.material.has_holes() {
             return false;
         }
         let dimension = Dimension::new(crossing, Purpose::Opacity);

@@ -1,7 +1,5 @@
 //! Views: looks at something that is not light.
 
-use std::time::Instant;
-
 use glam::Vec3;
 
 use super::super::RenderInput;
@@ -10,14 +8,12 @@ use super::super::sampler::Sampler;
 use super::super::shading::ShadedPoint;
 use super::stage::{Met, Stage};
 use super::{Integrator, RayCounts};
+use crate::prism::count_steps;
 use crate::ray::Ray;
 use crate::scene::View;
 
-/// Traces of one ray for its cost; the quickest counts, since others may have been interrupted.
-const TRIALS: usize = 3;
-
-/// The cost view's scale: black at none, red at about one, white at many times this, microseconds.
-const COST_UNIT: f32 = 4.0;
+/// Steps that the cost view shows in red.
+const RED_STEPS: f32 = 12.0;
 
 /// One view.
 pub struct Look<'a> {
@@ -36,17 +32,15 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// Wall-clock microseconds of tracing `ray` to its first hit.
-    fn cost(&self, ray: &Ray) -> f32 {
-        let trial = |_| {
-            let start = Instant::now();
-            std::hint::black_box(self.stage.tracer.intersect(ray));
-            start.elapsed().as_secs_f32() * 1e6
-        };
-        (0..TRIALS).map(trial).fold(f32::INFINITY, f32::min)
+    /// Steps of the march along `ray` as far as `t`, where it first hits. A ray that ends there meets nothing, so that
+    /// the count is the same in whatever order a backend visits the prisms.
+    fn cost(&self, ray: &Ray, t: f32) -> u32 {
+        let ray = Ray { tfar: t, ..*ray };
+        let (_, steps) = count_steps(|| self.stage.tracer.intersect(&ray));
+        u32::try_from(steps).unwrap_or(u32::MAX)
     }
 
-    fn show(&self, ray: &Ray, met: &Met, shaded: &ShadedPoint) -> Vec3 {
+    fn show(&self, met: &Met, shaded: &ShadedPoint, cost: u32) -> Vec3 {
         let point = &met.point;
         let signed = |n: Vec3| 0.5 * (n + Vec3::ONE);
         match self.view {
@@ -60,7 +54,7 @@ impl<'a> Look<'a> {
                 Vec3::new(0.5 + part, 0.5 - part.abs(), 0.5 - part)
             }
             View::Prim => color_of(met.hit.prim ^ met.hit.top().rotate_left(20)),
-            View::Cost => heat(self.cost(ray) / COST_UNIT),
+            View::Cost => heat(cost),
         }
     }
 }
@@ -68,16 +62,22 @@ impl<'a> Look<'a> {
 impl Integrator for Look<'_> {
     fn sample(&self, camera_ray: &Ray, _: &Sampler, rays: &mut RayCounts) -> CameraSample {
         rays.camera += 1;
-        let Some(met) = self.stage.meet(camera_ray, &self.stage.cone) else {
-            return CameraSample::background(match self.view {
-                View::Cost => heat(self.cost(camera_ray) / COST_UNIT),
-                _ => Vec3::ZERO,
-            });
+        let met = self.stage.meet(camera_ray, &self.stage.cone);
+        let cost = match self.view {
+            View::Cost => self.cost(camera_ray, met.map_or(camera_ray.tfar, |met| met.hit.t)),
+            _ => 0,
+        };
+        let Some(met) = met else {
+            return CameraSample {
+                cost,
+                ..CameraSample::background(heat(cost))
+            };
         };
         let point = self.stage.shade(camera_ray, &met, met.material.ior, 0.0);
         CameraSample {
-            radiance: self.show(camera_ray, &met, &point),
+            radiance: self.show(&met, &point, cost),
             first: Some(self.stage.first_hit(&met, &point)),
+            cost,
         }
     }
 }
@@ -89,8 +89,8 @@ fn color_of(id: u32) -> Vec3 {
     Vec3::from([0, 8, 16].map(|shift| 0.15 + 0.8 * (bits >> shift & 0xff) as f32 / 255.0))
 }
 
-/// Black, blue, red, yellow, white for 0, and on by doubling from 1/4.
-fn heat(x: f32) -> Vec3 {
+/// Black, blue, red, yellow, white at 0, 1/3, 1, 7/3 and 5 times [`RED_STEPS`].
+fn heat(steps: u32) -> Vec3 {
     const STOPS: [Vec3; 5] = [
         Vec3::ZERO,
         Vec3::new(0.05, 0.1, 0.6),
@@ -98,8 +98,8 @@ fn heat(x: f32) -> Vec3 {
         Vec3::new(1.0, 0.8, 0.1),
         Vec3::ONE,
     ];
-    // 0, 1/3, 1, 7/3, 5: each step covers twice the range of the one before.
-    let at = ((1.0 + 3.0 * x.max(0.0)).log2()).min(4.0);
+    // Each part covers twice the range of the one before.
+    let at = (1.0 + 3.0 * steps as f32 / RED_STEPS).log2().min(4.0);
     let stop = (at as usize).min(3);
     STOPS[stop].lerp(STOPS[stop + 1], at - stop as f32)
 }
@@ -111,12 +111,13 @@ mod tests {
     #[test]
     fn heat_rises() {
         let mut last = -1.0;
-        for i in 0..100 {
-            let sum = heat(0.1 * i as f32).element_sum();
-            assert!(sum >= last, "{i}");
+        for steps in 0..100 {
+            let sum = heat(steps).element_sum();
+            assert!(sum >= last, "{steps}");
             last = sum;
         }
-        assert_eq!((heat(0.0), heat(5.0)), (Vec3::ZERO, Vec3::ONE));
+        assert_eq!(heat(0), Vec3::ZERO);
+        assert_eq!([heat(60), heat(u32::MAX)], [Vec3::ONE; 2]);
     }
 
     #[test]

@@ -104,7 +104,7 @@ impl SphereDistribution {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::testing::{Random, assert_chi_square};
+    use crate::render::testing::{Cap, Fineness};
 
     const WIDTH: usize = 8;
     const HEIGHT: usize = 6;
@@ -139,25 +139,18 @@ mod tests {
     #[test]
     fn samples_follow_the_density_by_chi_square() {
         let distribution = uneven();
-        let n = 50_000_u32;
-        let mut counts = [[0_u32; WIDTH]; HEIGHT];
-        let mut random = Random::new(1);
-        for _ in 0..n {
-            let (direction, pdf) = distribution.sample(random.point());
-            let point = latlong::point(direction);
-            let column = ((point.x * WIDTH as f32) as usize).min(WIDTH - 1);
-            let row = ((point.y.acos() / PI * HEIGHT as f32) as usize).min(HEIGHT - 1);
-            counts[row][column] += 1;
-            assert!(pdf > 0.0);
-        }
-        let border = |row: usize| (PI * row as f32 / HEIGHT as f32).cos();
-        let expected = |row: usize, column: usize| {
-            let solid_angle = 2.0 * PI / WIDTH as f32 * (border(row) - border(row + 1));
-            f64::from(n as f32 * distribution.cell_pdf(column, row) * solid_angle)
+        // Borders of the density's rows are none of the cells': many points.
+        let fineness = Fineness {
+            samples: 50_000,
+            cells: [2 * WIDTH, HEIGHT],
+            points: 64,
         };
-        let cells = (0..WIDTH * HEIGHT).map(|i| (i / WIDTH, i % WIDTH));
-        let cells = cells.map(|(row, column)| (counts[row][column], expected(row, column)));
-        assert_chi_square(cells, "sphere distribution");
+        Cap::sphere(Vec3::Y).assert_samples_follow(
+            "sphere distribution",
+            fineness,
+            |random| Some(distribution.sample(random.point()).0),
+            |direction| distribution.pdf(direction),
+        );
     }
 
     #[test]

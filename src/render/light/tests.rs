@@ -1,5 +1,5 @@
 use super::*;
-use crate::render::testing::Random;
+use crate::render::testing::{Cap, Fineness, Random};
 
 /// The law of every light: the mean of radiance * cos / pdf over samples is the irradiance that a fine
 /// grid of directions finds, and the density of a sample is what `pdf` says, but for samples on the
@@ -134,4 +134,96 @@ fn rays_meet_shapes_where_they_are() {
     assert_eq!(at(0.5, 0.5), Some(2.0));
     assert_eq!(at(-0.9, 0.5), None);
     assert_eq!(flat.meet(Vec3::new(0.5, 0.5, 4.0), Vec3::NEG_Z), None);
+}
+
+const FINE: Fineness = Fineness {
+    samples: 40_000,
+    cells: [16, 12],
+    points: 32,
+};
+
+#[test]
+fn shapes_are_sampled_with_their_density_by_chi_square() {
+    let position = Vec3::new(0.3, -0.2, 0.1);
+    let towards = Vec3::new(0.48, 0.6, 0.64);
+    let sphere = |distance: f32, radius: f32| SphereLight {
+        center: position + distance * towards,
+        radius,
+        radiance: Vec3::ONE,
+    };
+    let disk = |normal: Vec3| {
+        FlatLight::disk(position + 2.0 * towards, normal.normalize(), 1.5, Vec3::ONE)
+    };
+    let corner = position + towards - Vec3::new(0.7, 0.4, 0.0);
+    let skewed = [Vec3::new(0.2, 0.9, 0.1), Vec3::new(1.4, 0.3, -0.2)];
+    let lights: [(&str, Box<dyn LocalLight>); 6] = [
+        ("sphere", Box::new(sphere(3.0, 0.7))),
+        ("sphere near by", Box::new(sphere(1.01, 1.0))),
+        ("sphere far away", Box::new(sphere(500.0, 1.0))),
+        ("disk", Box::new(disk(-towards))),
+        (
+            "disk from the side",
+            Box::new(disk(Vec3::new(-0.9, 0.1, 0.0))),
+        ),
+        (
+            "rectangle",
+            Box::new(FlatLight::rectangle(corner, skewed, Vec3::ONE)),
+        ),
+    ];
+    for (name, light) in lights {
+        // A little more than the light covers.
+        let drop = match name {
+            "sphere far away" => 4e-6,
+            "sphere" => 0.04,
+            _ => 2.0,
+        };
+        Cap::around(towards, drop).assert_samples_follow(
+            name,
+            FINE,
+            |random| {
+                let sample = light.sample(position, random.point());
+                (sample.pdf > 0.0).then_some(sample.direction)
+            },
+            |direction| light.pdf(position, direction),
+        );
+    }
+}
+
+#[test]
+fn what_is_far_is_sampled_with_its_density_by_chi_square() {
+    let direction = Vec3::new(0.48, 0.6, 0.64);
+    let normal = Vec3::new(0.2, 0.9, -0.3).normalize();
+    let image = crate::image::EnvironmentImage {
+        width: 16,
+        height: 8,
+        pixels: (0..128)
+            .map(|i| Vec3::splat((i * 37 % 16) as f32))
+            .collect(),
+    };
+    let lights: [(&str, Box<dyn InfiniteLight>, Cap); 4] = [
+        (
+            "sun",
+            Box::new(Sun::new(direction, 3.0, 1.0)),
+            Cap::around(direction, 1.4e-5),
+        ),
+        (
+            "sky",
+            Box::new(Sky::new(direction, 4.0, 1.0)),
+            Cap::sphere(Vec3::Y),
+        ),
+        (
+            "environment",
+            Box::new(Environment::new(image.into(), 0.7, 2.0)),
+            Cap::sphere(Vec3::Y),
+        ),
+        ("white world", Box::new(WhiteWorld), Cap::sphere(normal)),
+    ];
+    for (name, light, cap) in lights {
+        cap.assert_samples_follow(
+            name,
+            FINE,
+            |random| Some(light.sample(normal, random.point()).direction),
+            |direction| light.pdf(normal, direction),
+        );
+    }
 }

@@ -114,6 +114,7 @@ impl Builder {
             coat_roughness: scalar(&file.coat_roughness)?,
             sheen_roughness: scalar(&file.sheen_roughness)?,
             opacity: scalar(&file.opacity)?,
+            opacity_cutoff: file.opacity_cutoff,
             ior: file.ior,
             attenuation_color: file.attenuation_color,
             attenuation_distance: file.attenuation_distance,

@@ -216,12 +216,13 @@ fn seams_close_on_demand_and_only_for_the_exact_march() {
 
 #[test]
 fn all_parameters_of_a_material_arrive() {
-    let scene = "[[mesh]]\nfile = \"two.obj\"\nmaterial = \"m\"\n[[material]]\nname = \"m\"\nior = 1.3\npriority = 7\ntransmission = 1\nattenuation_color = [0.5, 1, 1]\nroughness = { file = \"height.png\", factor = 0.5 }\nopacity = { file = \"height.png\" }\nemission = { file = \"color.png\" }\nbump = { file = \"height.png\", scale = 0.25 }\n";
+    let scene = "[[mesh]]\nfile = \"two.obj\"\nmaterial = \"m\"\n[[material]]\nname = \"m\"\nior = 1.3\npriority = 7\ntransmission = 1\nattenuation_color = [0.5, 1, 1]\nroughness = { file = \"height.png\", factor = 0.5 }\nopacity = { file = \"height.png\" }\nopacity_cutoff = 0.25\nemission = { file = \"color.png\" }\nbump = { file = \"height.png\", scale = 0.25 }\n";
     let loaded = load(&folder(), scene).unwrap();
     let material = &loaded.scene.materials[0];
     assert_eq!((material.ior, material.priority), (1.3, 7));
     assert_eq!(material.attenuation_distance, 1.0);
     assert!(material.is_transmissive() && material.is_emissive());
+    assert!(material.opacity_cutoff == Some(0.25) && material.has_holes());
     let (Scalar::Texture(roughness), Scalar::Texture(opacity)) =
         (&material.roughness, &material.opacity)
     else {

@@ -94,6 +94,7 @@ impl MaterialTable {
             "emission",
             "emission_strength",
             "opacity",
+            "opacity_cutoff",
             "normal_map",
             "bump",
         ])?;
@@ -144,7 +145,11 @@ fn plain(section: &mut Section) -> Result<Material, SceneError> {
     })?;
     let priority = section.optional("priority", |i| i.integer(0..=255))?;
     let emission_strength = section.optional("emission_strength", super::factor)?;
+    let opacity_cutoff = section.optional("opacity_cutoff", |i| {
+        i.number("an opacity from 0 to 1", |x| (0.0..=1.0).contains(&x))
+    })?;
     Ok(Material {
+        opacity_cutoff,
         ior: ior.unwrap_or(default.ior),
         attenuation_color: attenuation_color.unwrap_or(default.attenuation_color),
         attenuation_distance: attenuation_distance.unwrap_or(if attenuation_color.is_some() {

@@ -187,6 +187,7 @@ fn values_that_no_material_light_or_camera_has_are_refused() {
         ("roughness = 1.5", "from 0 to 1"),
         ("metallic = -0.1", "from 0 to 1"),
         ("ior = 0.9", "from 1 to 3"),
+        ("opacity_cutoff = 1.5", "from 0 to 1"),
         ("base_color = [2, 0, 0]", "from 0 to 1"),
         ("emission = [-1, 0, 0]", "at least 0"),
         ("emission = [nan, 0, 0]", "at least 0"),

@@ -5,13 +5,14 @@
 
 mod material;
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use ::gltf as crate_gltf;
 use crate_gltf::accessor::{Accessor, DataType, Dimensions};
 use crate_gltf::json::Index;
 use crate_gltf::mesh::Mode;
-use crate_gltf::{Document, Gltf, Primitive, Semantic};
+use crate_gltf::{Document, Gltf, Material, Primitive, Semantic};
 use glam::{Affine3A, Mat4, Vec2, Vec3};
 use serde::Deserialize as _;
 
@@ -33,6 +34,12 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
         .default_scene()
         .or_else(|| document.scenes().next())
         .ok_or_else(|| malformed("glTF document", "it has no scene"))?;
+    let reader = material::Reader {
+        document: &document,
+        buffers: &buffers,
+        path,
+    };
+    let mut texcoords = TexcoordChoice::default();
     let mut parts = Parts::default();
     let mut seen = vec![false; document.nodes().len()];
     let mut pending: Vec<_> = scene.nodes().map(|n| (n, Affine3A::IDENTITY)).collect();
@@ -55,21 +62,47 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
         let name = node.name().or(mesh.name()).unwrap_or("");
         for primitive in mesh.primitives() {
             let place = format!("mesh {} primitive {}", mesh.index(), primitive.index());
-            let builder = read_primitive(&primitive, &document, &buffers, &place)?;
+            let set = texcoords.of(&reader, &primitive.material());
+            let builder = read_primitive(&primitive, set, &document, &buffers, &place)?;
             let builder = builder.transformed(&to_world);
             parts.add(name, primitive.material().index(), builder);
         }
     }
-    let reader = material::Reader {
-        document: &document,
-        buffers: &buffers,
-        path,
-    };
     let parts = parts.finish(|index| reader.material(index));
     Ok(LoadedFile {
         parts,
-        warnings: Vec::new(),
+        warnings: texcoords.warnings,
     })
+}
+
+/// Which of its sets of texture coordinates a mesh keeps: it has one here.
+#[derive(Default)]
+struct TexcoordChoice {
+    by_material: HashMap<usize, u32>,
+    warnings: Vec<String>,
+}
+
+impl TexcoordChoice {
+    /// The set that the material's textures are read by. If they are read by several, the first, with a warning.
+    fn of(&mut self, reader: &material::Reader, material: &Material) -> u32 {
+        // The default material has no textures.
+        let Some(index) = material.index() else {
+            return 0;
+        };
+        *self.by_material.entry(index).or_insert_with(|| {
+            let sets = reader.texcoord_sets(index);
+            let first = sets.first().copied().unwrap_or(0);
+            if sets.len() > 1 {
+                let names: Vec<String> = sets.iter().map(u32::to_string).collect();
+                self.warnings.push(format!(
+                    "material {:?} reads its textures by the texture coordinates {}; a mesh has one set here, and all are read by {first}",
+                    material.name().unwrap_or(""),
+                    names.join(" and "),
+                ));
+            }
+            first
+        })
+    }
 }
 
 fn malformed(what: &str, problem: impl Into<String>) -> LoadMeshErrorKind {
@@ -216,9 +249,10 @@ fn percent_decoded(uri: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// The triangles of a primitive in its own space; none for points and lines.
+/// The triangles of a primitive in its own space, with this set of its texture coordinates; none for points and lines.
 fn read_primitive(
     primitive: &Primitive,
+    set: u32,
     document: &Document,
     buffers: &[Vec<u8>],
     place: &str,
@@ -232,14 +266,14 @@ fn read_primitive(
     if let Some(extension) = primitive.extension_value(draco::EXTENSION) {
         let compressed = Compressed::deserialize(extension)
             .map_err(|e| malformed(&format!("{place} {}", draco::EXTENSION), e.to_string()))?;
-        return read_compressed(primitive, &compressed, document, buffers, place);
+        return read_compressed(primitive, set, compressed, document, buffers, place);
     }
     let floats = [DataType::F32];
     let attributes = [
         (Semantic::Positions, Dimensions::Vec3, &floats[..]),
         (Semantic::Normals, Dimensions::Vec3, &floats[..]),
         (
-            Semantic::TexCoords(0),
+            Semantic::TexCoords(set),
             Dimensions::Vec2,
             &[DataType::F32, DataType::U8, DataType::U16][..],
         ),
@@ -262,7 +296,7 @@ fn read_primitive(
         .map(Vec3::from)
         .collect();
     let normals = reader.read_normals().into_iter().flatten();
-    let texcoords = reader.read_tex_coords(0).map(|t| t.into_f32());
+    let texcoords = reader.read_tex_coords(set).map(|t| t.into_f32());
     let indices: Vec<u32> = match reader.read_indices() {
         Some(indices) => indices.into_u32().collect(),
         None => (0..positions.len() as u32).collect(),
@@ -288,12 +322,13 @@ fn v_up(st: Vec2) -> Vec2 {
 /// A primitive whose triangles are in a Draco stream. Whatever its mode, the stream holds single triangles.
 fn read_compressed(
     primitive: &Primitive,
-    compressed: &Compressed,
+    set: u32,
+    mut compressed: Compressed,
     document: &Document,
     buffers: &[Vec<u8>],
     place: &str,
 ) -> Result<MeshBuilder, LoadMeshErrorKind> {
-    for semantic in [Semantic::Normals, Semantic::TexCoords(0)] {
+    for semantic in [Semantic::Normals, Semantic::TexCoords(set)] {
         let name = semantic.to_string();
         if primitive.get(&semantic).is_some() && !compressed.attributes.contains_key(&name) {
             return Err(LoadMeshErrorKind::Unsupported {
@@ -301,6 +336,15 @@ fn read_compressed(
             });
         }
     }
+    // The decoder knows one set, the first.
+    let chosen = Semantic::TexCoords(set).to_string();
+    let first = compressed.attributes.remove(&chosen);
+    compressed
+        .attributes
+        .retain(|name, _| !name.starts_with("TEXCOORD_"));
+    compressed
+        .attributes
+        .extend(first.map(|id| ("TEXCOORD_0".to_owned(), id)));
     let what = format!("{place} Draco stream");
     let stream = view_bytes(document, compressed.buffer_view, buffers)
         .ok_or_else(|| malformed(&what, "its buffer view lies outside of the buffer"))?;

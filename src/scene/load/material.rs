@@ -39,6 +39,8 @@ pub struct FileMaterial {
     pub emission: FileColor,
     /// 0 is a hole.
     pub opacity: FileScalar,
+    /// If given, below it there is a hole and from it on there is none.
+    pub opacity_cutoff: Option<f32>,
     /// A normal map.
     pub detail: Option<FileDetail>,
     /// The displacement map, where the format knows one (MTL).
@@ -65,6 +67,7 @@ impl Default for FileMaterial {
             sheen_roughness: scalar(0.0),
             emission: FileColor::constant(Vec3::ZERO),
             opacity: scalar(1.0),
+            opacity_cutoff: None,
             detail: None,
             displacement: None,
         }

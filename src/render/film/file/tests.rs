@@ -18,6 +18,7 @@ fn film() -> Film {
         width: 7,
         height: 5,
         spp: SPP,
+        aovs: AovSet::ALL.with(Aov::Cost),
         ..Film::default()
     }
 }
@@ -71,6 +72,7 @@ fn rendered(film: &Film, corners: [u32; 4], samples: Range<u32>) -> FrameFile {
                     object: 0,
                     prim: number,
                 }),
+                cost: (100.0 * x) as u32,
             };
             pixel.add(&sample, if number == 5 { -1 } else { 1 }, 3.0 * x, object);
         }

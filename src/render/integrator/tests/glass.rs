@@ -144,3 +144,38 @@ fn a_camera_in_stone_is_noticed_and_one_in_glass_or_outside_is_not() {
     assert_eq!(enclosing(white(), Vec3::new(0.1, 0.2, -1.3)), None);
     assert_eq!(enclosing(glass(0.0), Vec3::new(0.1, 0.2, -0.3)), None);
 }
+
+#[test]
+fn a_floor_through_the_stone_hides_nothing_but_a_lamp_may_be_inside() {
+    let floor = || quad(Vec3::new(-3.0, -3.0, -0.6), 6.0 * Vec3::X, 6.0 * Vec3::Y);
+    let enclosing = |stone: Shape, lights: Vec<Light>, z: f32| {
+        let mut scene = Scene::new(vec![(floor(), white()), (stone, white())], lights);
+        scene.camera.position = Vec3::new(0.1, 0.2, z);
+        scene.with_input(enclosing_object)
+    };
+    let stone = || displaced_ball(0.9, 0.1, waves);
+    let sun = || Light::Directional {
+        direction: Vec3::Z,
+        irradiance: Vec3::ONE,
+    };
+    // Above the floor, below it, and outside of the stone above and below.
+    for (z, expected) in [(-0.3, Some(1)), (-0.7, Some(1)), (1.3, None), (-1.3, None)] {
+        for lights in [vec![], vec![sun()]] {
+            assert_eq!(enclosing(stone(), lights, z), expected, "{z}");
+        }
+        assert_eq!(enclosing(stone(), dark_room(), z), None, "a lamp, {z}");
+    }
+    // Between the shells of a hollow one is stone, in the hollow is none.
+    let mut hollow = ball(1.0);
+    let mut inner = ball(0.5);
+    for triangle in &mut inner.triangles {
+        triangle.swap(0, 1);
+    }
+    for normal in &mut inner.normals {
+        *normal = -*normal;
+    }
+    hollow.append(inner);
+    let hollow = Shape::Triangles(built(hollow));
+    assert_eq!(enclosing(hollow.clone(), vec![], 0.0), None);
+    assert_eq!(enclosing(hollow, vec![], -0.75), Some(1));
+}

@@ -18,11 +18,12 @@ use crate::surface::{
 use crate::trace::{Hit, Object, PlacedObject, Placement, Shape, World};
 
 mod glass;
+mod lights;
 mod setting;
 mod shapes;
 
 use setting::Scene;
-use shapes::{ball, built, displaced_ball, quad, slab, waves};
+use shapes::{ball, built, displaced, displaced_ball, quad, quad_mesh, slab, waves};
 
 /// A lamp that shines nothing: without any, the world would be white.
 fn dark_room() -> Vec<Light> {
@@ -284,4 +285,24 @@ fn holes_let_light_and_looks_through() {
     });
     // Down and up through the sheet: 0.75 each way.
     assert!((mean.x - 0.5625).abs() < 0.02, "{mean}");
+}
+
+#[test]
+fn what_is_below_a_cutoff_is_a_hole_and_nothing_else_is() {
+    let sheet = |opacity: f32, cutoff: f32| {
+        let material = Material {
+            opacity: Scalar::Constant(opacity),
+            opacity_cutoff: Some(cutoff),
+            ..emissive(Vec3::ONE)
+        };
+        let sheet = quad(Vec3::new(-3.0, -3.0, 1.0), 6.0 * Vec3::X, 6.0 * Vec3::Y);
+        let scene = Scene::new(vec![(sheet, material)], dark_room());
+        let seen = Ray::new(Vec3::new(0.1, 0.2, 5.0), Vec3::NEG_Z);
+        scene
+            .mean(Options::global(PathLimits::default()), 8, |_| seen)
+            .x
+    };
+    for (opacity, cutoff, expected) in [(0.5, 0.5, 1.0), (0.49, 0.5, 0.0), (1.0, 1.1, 0.0)] {
+        assert_eq!(sheet(opacity, cutoff), expected, "{opacity} {cutoff}");
+    }
 }

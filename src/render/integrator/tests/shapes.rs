@@ -41,13 +41,17 @@ pub(super) fn built(mesh: MeshBuilder) -> Arc<crate::surface::BaseMesh> {
 
 /// A displaced ball; `height` is of (s, t).
 pub(super) fn displaced_ball(radius: f32, scale: f32, height: impl Fn(f32, f32) -> f32) -> Shape {
+    displaced(ball(radius), scale, height)
+}
+
+/// A displaced mesh; `height` is of (s, t).
+pub(super) fn displaced(mesh: MeshBuilder, scale: f32, height: impl Fn(f32, f32) -> f32) -> Shape {
     let side = 64;
     let texel = |i: usize| (i as f32 + 0.5) / side as f32;
     let texels = (0..side * side).map(|i| height(texel(i % side), texel(i / side)));
     let map = DisplacementMap::new(side, side, Texels::F32(texels.collect()), Wrap::Repeat);
     let displacement = Displacement::new(scale);
-    let surface =
-        DisplacedSurface::new(built(ball(radius)), Arc::new(map.unwrap()), displacement).unwrap();
+    let surface = DisplacedSurface::new(built(mesh), Arc::new(map.unwrap()), displacement).unwrap();
     let surface = Arc::new(surface.with_seams(Seams::Closed));
     Shape::Displaced(Arc::new(
         Prisms::new(surface, PrismOptions::default()).unwrap(),
@@ -63,13 +67,17 @@ pub(super) fn waves(s: f32, t: f32) -> f32 {
 
 /// A quad from a corner along two edges, its front where `a x b` points to.
 pub(super) fn quad(corner: Vec3, a: Vec3, b: Vec3) -> Shape {
-    let mesh = MeshBuilder {
+    Shape::Triangles(built(quad_mesh(corner, a, b)))
+}
+
+/// Its mesh.
+pub(super) fn quad_mesh(corner: Vec3, a: Vec3, b: Vec3) -> MeshBuilder {
+    MeshBuilder {
         positions: vec![corner, corner + a, corner + a + b, corner + b],
         normals: vec![a.cross(b).normalize(); 4],
         texcoords: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-    };
-    Shape::Triangles(built(mesh))
+    }
 }
 
 /// A box from `min` to `max`, its front outside.

@@ -4,6 +4,7 @@
 //! Read from the plain JSON: the crate's accessors panic on an image without a source, and know not all extensions.
 //! What is missing or of another type than it should be is as if it were not there; numbers out of range are clamped.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
@@ -105,6 +106,8 @@ impl Reader<'_> {
             ),
             emission,
             opacity: self.opacity(&m),
+            opacity_cutoff: (m["alphaMode"] == "MASK")
+                .then(|| number("/alphaCutoff".into(), 0.5).max(0.0)),
             detail: self
                 .texture(&m, "/normalTexture")
                 .map(|texture| FileDetail::NormalMap {
@@ -115,7 +118,7 @@ impl Reader<'_> {
         })
     }
 
-    /// The alpha of the base colour, unless the mode is OPAQUE. MASK is taken for BLEND: its edge is the texture's.
+    /// The alpha of the base colour, unless the mode is OPAQUE.
     fn opacity(&self, m: &Value) -> FileScalar {
         if !matches!(m["alphaMode"].as_str(), Some("MASK" | "BLEND")) {
             return FileScalar::constant(1.0);
@@ -126,6 +129,16 @@ impl Reader<'_> {
                 .texture(m, "/pbrMetallicRoughness/baseColorTexture")
                 .map(|t| (t, "a")),
         }
+    }
+
+    /// The sets of texture coordinates that the textures of material number `index` are read by, but for occlusion, which we do not read.
+    pub fn texcoord_sets(&self, index: usize) -> BTreeSet<u32> {
+        let mut sets = BTreeSet::new();
+        let json = self.document.as_json().materials.get(index);
+        if let Some(Ok(m)) = json.map(serde_json::to_value) {
+            add_texcoord_sets(&m, &mut sets);
+        }
+        sets
     }
 
     fn color(&self, m: &Value, factor: &str, texture: &str, default: Vec3) -> FileColor {
@@ -187,6 +200,21 @@ fn uv_transform(t: &Value) -> UvTransform {
         scale,
         rotation,
         offset: Vec2::new(offset.x + sin * scale.y, 1.0 - offset.y - cos * scale.y),
+    }
+}
+
+fn add_texcoord_sets(m: &Value, sets: &mut BTreeSet<u32>) {
+    for (key, value) in m.as_object().into_iter().flatten() {
+        if key == "occlusionTexture" {
+            continue;
+        }
+        if value["index"].is_u64() {
+            let transform = &value["extensions"]["KHR_texture_transform"]["texCoord"];
+            let set = transform.as_u64().or(value["texCoord"].as_u64());
+            sets.insert(set.unwrap_or(0).try_into().unwrap_or(u32::MAX));
+        } else {
+            add_texcoord_sets(value, sets);
+        }
     }
 }
 

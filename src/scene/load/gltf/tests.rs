@@ -237,12 +237,21 @@ fn compressed_document(stream: &[u8]) -> Value {
 fn a_compressed_primitive_is_unpacked_with_v_up() {
     let stream = sheet(7);
     let document = compressed_document(&stream);
-    let mut file = load_bytes("m.glb", &glb(&document, &stream)).unwrap();
-    let mesh = file.parts.remove(0).mesh;
-    assert_eq!(mesh.triangles.len(), SHEET.triangles);
-    for (p, st) in mesh.positions.iter().zip(&mesh.texcoords) {
-        // The sheet is at y = 2 v with v down.
-        assert!((p.y - 2.0 * (1.0 - st.y)).abs() < 1e-3, "{p} at {st}");
+    // The same as a second set, which the material names.
+    let mut second = document.clone();
+    let primitive = &mut second["meshes"][0]["primitives"][0];
+    primitive["attributes"] = json!({"POSITION": 0, "TEXCOORD_1": 1});
+    primitive["extensions"][draco::EXTENSION]["attributes"] =
+        json!({"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 2});
+    second["materials"][0] = json!({ "emissiveTexture": { "index": 0, "texCoord": 1 } });
+    for document in [document, second] {
+        let mut file = load_bytes("m.glb", &glb(&document, &stream)).unwrap();
+        let mesh = file.parts.remove(0).mesh;
+        assert_eq!(mesh.triangles.len(), SHEET.triangles);
+        for (p, st) in mesh.positions.iter().zip(&mesh.texcoords) {
+            // The sheet is at y = 2 v with v down.
+            assert!((p.y - 2.0 * (1.0 - st.y)).abs() < 1e-3, "{p} at {st}");
+        }
     }
 }
 
@@ -341,4 +350,67 @@ fn extensions_of_materials_are_read() {
         material.detail,
         Some(FileDetail::NormalMap { strength: 0.5, .. })
     ));
+}
+
+#[test]
+fn masks_have_a_cutoff_and_blends_have_none() {
+    let cutoff = |material: Value| {
+        let document = with("/materials/0", material);
+        let part = load(&document).unwrap().parts.remove(0);
+        part.material.unwrap().opacity_cutoff
+    };
+    let mask = |cutoff: f32| json!({ "alphaMode": "MASK", "alphaCutoff": cutoff });
+    assert_eq!(cutoff(json!({ "alphaMode": "MASK" })), Some(0.5));
+    assert_eq!(cutoff(mask(0.25)), Some(0.25));
+    assert_eq!(cutoff(mask(-1.0)), Some(0.0));
+    for other in ["BLEND", "OPAQUE"] {
+        let material = json!({ "alphaMode": other, "alphaCutoff": 0.25 });
+        assert_eq!(cutoff(material), None);
+    }
+}
+
+#[test]
+fn textures_may_name_another_set_of_texture_coordinates() {
+    // A second set: the first with u and v swapped, behind all other data.
+    let mut bytes = binary();
+    let swapped: Vec<u8> = bytes[48..64]
+        .chunks(4)
+        .flat_map(|uv| [uv[2], uv[3], uv[0], uv[1]])
+        .collect();
+    bytes.extend(swapped);
+    let read = |material: Value| {
+        let mut document = document();
+        document["buffers"][0]["byteLength"] = json!(92);
+        let view = json!({"buffer": 0, "byteOffset": 76, "byteLength": 16});
+        document["bufferViews"].as_array_mut().unwrap().push(view);
+        let accessor = json!({"bufferView": 3, "componentType": U16, "count": 4, "type": "VEC2", "normalized": true});
+        document["accessors"].as_array_mut().unwrap().push(accessor);
+        document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = json!(3);
+        document["materials"][0] = material;
+        let file = load_bytes("m.glb", &glb(&document, &bytes)).unwrap();
+        // Corner 1 is at (1, 0) in the first set, v down.
+        (file.parts[0].mesh.texcoords[1], file.warnings)
+    };
+    let (first, second) = (Vec2::new(1.0, 1.0), Vec2::new(0.0, 0.0));
+    let base = |texture: Value| json!({ "pbrMetallicRoughness": { "baseColorTexture": texture } });
+    assert_eq!(read(base(json!({ "index": 0 }))), (first, vec![]));
+    assert_eq!(
+        read(base(json!({ "index": 0, "texCoord": 1 }))),
+        (second, vec![])
+    );
+    let moved = json!({ "KHR_texture_transform": { "texCoord": 1 } });
+    assert_eq!(
+        read(base(json!({ "index": 0, "extensions": moved }))),
+        (second, vec![])
+    );
+    // Occlusion is not read, so its set does not matter.
+    let mut occluded = base(json!({ "index": 0 }));
+    occluded["occlusionTexture"] = json!({ "index": 0, "texCoord": 1 });
+    assert_eq!(read(occluded), (first, vec![]));
+    let mut both = base(json!({ "index": 0, "texCoord": 1 }));
+    both["name"] = json!("paint");
+    both["emissiveTexture"] = json!({ "index": 0 });
+    let (texcoord, warnings) = read(both);
+    assert_eq!((texcoord, warnings.len()), (first, 1));
+    assert!(warnings[0].contains("\"paint\"") && warnings[0].contains("0 and 1"));
 }
