@@ -27,7 +27,7 @@ pub fn count() {
 /// use prismarch::ray::Ray;
 /// use prismarch::trace::Tracer;
 ///
-/// /// Steps from the ray's origin to its hit, through a world of counting prisms: the same for every backend.
+/// /// Steps from the ray's origin to its hit, through a world of counting prisms.
 /// fn cost(tracer: &dyn Tracer, ray: &Ray) -> u64 {
 ///     let tfar = tracer.intersect(ray).map_or(ray.tfar, |hit| hit.t);
 ///     // Nothing is hit before the hit, so all that lies before it is marched.
