@@ -26,6 +26,15 @@ enum Owners {
     Halves(Vec<u32>),
 }
 
+/// A place on a triangle.
+pub struct Place {
+    pub triangle: u32,
+    pub u: f32,
+    pub v: f32,
+    /// Whether u and v run against the caller's.
+    pub is_turned: bool,
+}
+
 /// The caller's primitives.
 pub enum Primitives {
     Triangles(Vec<[u32; 3]>),
@@ -151,16 +160,19 @@ impl Base {
     }
 
     /// The way back. `None` where the primitive is not there or has no area.
-    pub fn to_triangle(&self, prim: u32, u: f32, v: f32) -> Option<(u32, f32, f32)> {
+    pub fn to_triangle(&self, prim: u32, u: f32, v: f32) -> Option<Place> {
+        let straight = |triangle| Place {
+            triangle,
+            u,
+            v,
+            is_turned: false,
+        };
         let Owners::Halves(owners) = &self.owners else {
-            return Some((prim, u, v));
+            return Some(straight(prim));
         };
         if prim >= self.primitives {
-            return Some((
-                (prim - self.primitives).checked_add(owners.len() as u32)?,
-                u,
-                v,
-            ));
+            let wall = (prim - self.primitives).checked_add(owners.len() as u32)?;
+            return Some(straight(wall));
         }
         let first = owners.partition_point(|&n| n < 2 * prim);
         let is_of = |i: usize| owners.get(i).is_some_and(|&n| n / 2 == prim);
@@ -172,10 +184,16 @@ impl Base {
         if !is_of(second) {
             return None;
         }
+        let place = straight(second as u32);
         Some(if owners[second] & 1 == 0 {
-            (second as u32, u, v)
+            place
         } else {
-            (second as u32, 1.0 - u, 1.0 - v)
+            Place {
+                u: 1.0 - u,
+                v: 1.0 - v,
+                is_turned: true,
+                ..place
+            }
         })
     }
 }

@@ -51,11 +51,11 @@ pub struct Live {
 unsafe impl Sync for Live {}
 
 /// A call of Embree's.
-struct Flight<'a>(#[cfg_attr(not(debug_assertions), allow(dead_code))] &'a Live);
+pub struct Flight<'a>(#[cfg_attr(not(debug_assertions), allow(dead_code))] &'a Live);
 
 impl<'a> Flight<'a> {
     #[inline(always)]
-    fn new(live: &'a Live) -> Self {
+    pub fn new(live: &'a Live) -> Self {
         #[cfg(debug_assertions)]
         live.in_flight.fetch_add(1, Ordering::AcqRel);
         Self(live)

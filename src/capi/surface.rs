@@ -194,15 +194,23 @@ impl Surface {
                 "time is {time}; expected 0 to 1"
             )));
         }
-        let (triangle, s, t) = self.live.base.to_triangle(prim, u, v).ok_or_else(|| {
+        let at = self.live.base.to_triangle(prim, u, v).ok_or_else(|| {
             Failure::argument(format!("primitive {prim} has no triangle with an area"))
         })?;
         let mut found = match self.live.now() {
-            Traced::Standing(_) => self.live.now().surface().interpolate(triangle, s, t)?,
-            Traced::Moving(moving) => moving.surface().interpolate(triangle, s, t, time)?,
+            Traced::Standing(_) => {
+                self.live
+                    .now()
+                    .surface()
+                    .interpolate(at.triangle, at.u, at.v)?
+            }
+            Traced::Moving(moving) => {
+                moving
+                    .surface()
+                    .interpolate(at.triangle, at.u, at.v, time)?
+            }
         };
-        // The second half of a quad runs the other way.
-        if s != u {
+        if at.is_turned {
             (found.du, found.dv) = (-found.du, -found.dv);
         }
         Ok(found)
