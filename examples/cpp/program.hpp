@@ -86,6 +86,31 @@ struct Map {
   }
 };
 
+// A geometry of a surface; the bytes that the surface takes beside its map. The geometry keeps the surface, and that the map, which is
+// let go of here.
+inline RTCGeometry geometry_of(RTCDevice device, const prismarch_surface_desc &desc, size_t *bytes) {
+  prismarch_error error;
+  prismarch_surface *surface;
+  RTCGeometry geometry;
+  check(prismarch_surface_create(&desc, &surface, &error), error);
+  check(prismarch_geometry_create(device, surface, &geometry, &error), error);
+  check(prismarch_surface_bytes(surface, bytes, &error), error);
+  prismarch_surface_release(surface);
+  prismarch_map_release(desc.map);
+  return geometry;
+}
+
+// A scene of one geometry, which it keeps.
+inline RTCScene scene_of(RTCDevice device, RTCGeometry geometry) {
+  rtcSetGeometryMask(geometry, 0xffffffffu);
+  rtcCommitGeometry(geometry);
+  RTCScene scene = rtcNewScene(device);
+  rtcAttachGeometry(scene, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene);
+  return scene;
+}
+
 // A grey picture of a scene: light from one side, with shadows.
 inline std::vector<float> render(RTCScene scene, int size, Vec eye, Vec target) {
   const Vec forward = normalize(target - eye), right = normalize(cross(forward, {0, 0, 1})), up = cross(right, forward);

@@ -82,17 +82,7 @@ RTCGeometry displaced(RTCDevice device, const Torus &torus, const Map &map, size
   desc.texcoords.data = torus.texcoords.data();
   desc.map = map.create();
   desc.scale = SCALE;
-
-  prismarch_error error;
-  prismarch_surface *surface;
-  RTCGeometry geometry;
-  check(prismarch_surface_create(&desc, &surface, &error), error);
-  check(prismarch_geometry_create(device, surface, &geometry, &error), error);
-  check(prismarch_surface_bytes(surface, bytes, &error), error);
-  // The geometry keeps the surface, and that the map.
-  prismarch_surface_release(surface);
-  prismarch_map_release(desc.map);
-  return geometry;
+  return geometry_of(device, desc, bytes);
 }
 
 std::vector<float> picture_of(bool by_prismarch) {
@@ -102,12 +92,7 @@ std::vector<float> picture_of(bool by_prismarch) {
   const double start = seconds();
   size_t own = 0;
   RTCGeometry geometry = by_prismarch ? displaced(device, torus, map, &own) : tessellated(device, torus, map, 43);
-  rtcSetGeometryMask(geometry, 0xffffffffu);
-  rtcCommitGeometry(geometry);
-  RTCScene scene = rtcNewScene(device);
-  rtcAttachGeometry(scene, geometry);
-  rtcReleaseGeometry(geometry);
-  rtcCommitScene(scene);
+  RTCScene scene = scene_of(device, geometry);
   const double built = seconds();
   std::vector<float> picture = render(scene, SIZE, {2.2f, -2.9f, 2.2f}, {0, 0, -0.1f});
   std::printf("%-12s built in %.3f s, %.2f MB beside the map, rendered in %.3f s\n",

@@ -69,15 +69,7 @@ RTCGeometry by_prismarch(RTCDevice device, const Ground &ground, const Map &map,
   desc.texcoords.data = ground.texcoords.data();
   desc.map = map.create();
   desc.scale = SCALE;
-  prismarch_error error;
-  prismarch_surface *surface;
-  RTCGeometry geometry;
-  check(prismarch_surface_create(&desc, &surface, &error), error);
-  check(prismarch_geometry_create(device, surface, &geometry, &error), error);
-  check(prismarch_surface_bytes(surface, bytes, &error), error);
-  prismarch_surface_release(surface);
-  prismarch_map_release(desc.map);
-  return geometry;
+  return geometry_of(device, desc, bytes);
 }
 
 } // namespace
@@ -92,12 +84,7 @@ int main() {
     const double start = seconds();
     size_t own = 0;
     RTCGeometry geometry = k == 0 ? subdivided(device, ground, map) : by_prismarch(device, ground, map, &own);
-    rtcSetGeometryMask(geometry, 0xffffffffu);
-    rtcCommitGeometry(geometry);
-    RTCScene scene = rtcNewScene(device);
-    rtcAttachGeometry(scene, geometry);
-    rtcReleaseGeometry(geometry);
-    rtcCommitScene(scene);
+    RTCScene scene = scene_of(device, geometry);
     const double built = seconds();
     pictures[k] = render(scene, SIZE, {1.2f, -1.6f, 1.2f}, {0, 0, 0.05f});
     std::printf("| %s | %.3f | %.2f | %.3f |\n", k == 0 ? "subdivision, displacement function" : "prismarch", built - start,
