@@ -35,6 +35,7 @@ pub use edit::{TexelRect, Update};
 pub use grid::HeightSample;
 pub use interpolate::{InterpolateError, Interpolated};
 pub use map::{DisplacementMap, MapError};
+#[cfg(feature = "embree")] // for the C library
 pub(crate) use mesh::has_area;
 pub use mesh::{BaseMesh, MeshBuilder, MeshError, MeshReport, NormalMode};
 pub(crate) use motion::Corners;
