@@ -280,7 +280,11 @@ static void only_leaving(const struct RTCFilterFunctionNArguments *args) {
 
 static void filters(void) {
   begin("filters: a rejected hit lets the ray go on; user data; the call's filter");
+#if EMBREE_MAJOR == 3
   world w = new_world(RTC_SCENE_FLAG_NONE);
+#else
+  world w = new_world(RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS);
+#endif
   EXPECT(prismarch_geometry_set_user_data(w.geometry, &filter_calls, NULL) == PRISMARCH_OK);
   EXPECT(prismarch_geometry_user_data(w.geometry) == &filter_calls);
   rtcSetGeometryIntersectFilterFunction(w.geometry, only_leaving);
