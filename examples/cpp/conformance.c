@@ -280,11 +280,7 @@ static void only_leaving(const struct RTCFilterFunctionNArguments *args) {
 
 static void filters(void) {
   begin("filters: a rejected hit lets the ray go on; user data; the call's filter");
-#if EMBREE_MAJOR == 3
   world w = new_world(RTC_SCENE_FLAG_NONE);
-#else
-  world w = new_world(RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS);
-#endif
   EXPECT(prismarch_geometry_set_user_data(w.geometry, &filter_calls, NULL) == PRISMARCH_OK);
   EXPECT(prismarch_geometry_user_data(w.geometry) == &filter_calls);
   rtcSetGeometryIntersectFilterFunction(w.geometry, only_leaving);
@@ -298,6 +294,12 @@ static void filters(void) {
   EXPECT(is_hit(&q) && filter_calls > 1 && q.hit.Ng_x < 0);
   occluded1(w.scene, &s.ray, NULL);
   EXPECT(s.ray.tfar < 0);
+  /* Half way in only the far side is left, and a ray that ends before it is not occluded. */
+  struct RTCRayHit half = ray_at(o, d);
+  half.ray.tfar = 3;
+  occluded1(w.scene, &half.ray, NULL);
+  EXPECT(half.ray.tfar > 0);
+#if EMBREE_MAJOR == 3 /* Embree 4 does not give the call's filter to user geometries. */
   rtcSetGeometryIntersectFilterFunction(w.geometry, NULL);
   rtcSetGeometryOccludedFilterFunction(w.geometry, NULL);
   rtcCommitGeometry(w.geometry);
@@ -305,11 +307,7 @@ static void filters(void) {
   struct RTCRayHit p = ray_at(o, d);
   intersect1(w.scene, &p, only_leaving);
   EXPECT(same_hit(&p, &q));
-  /* Half way in only the far side is left, and a ray that ends before it is not occluded. */
-  struct RTCRayHit half = ray_at(o, d);
-  half.ray.tfar = 3;
-  occluded1(w.scene, &half.ray, only_leaving);
-  EXPECT(half.ray.tfar > 0);
+#endif
   free_world(&w);
   end();
 }
