@@ -27,10 +27,15 @@ fn oracle(patch: &Patch<'_>, ray: &Ray, bounds: Aabb) -> Option<f64> {
     if from >= to {
         return None;
     }
+    // S goes on past the triangle's edges, so that a crossing next to one still lies between two samples.
     let above = |t: f64| {
         let p = patch.project(origin + t * direction, 1.0 / 3.0, 1.0 / 3.0)?;
-        let inside = p.x >= 0.0 && p.y >= 0.0 && p.x + p.y <= 1.0;
-        inside.then(|| p.z * patch.normal(p.x, p.y).length() - patch.displacement(p.x, p.y))
+        Some(p.z * patch.normal(p.x, p.y).length() - patch.displacement(p.x, p.y))
+    };
+    let inside = |t: f64| {
+        patch
+            .project(origin + t * direction, 1.0 / 3.0, 1.0 / 3.0)
+            .is_some_and(|p| p.x >= 0.0 && p.y >= 0.0 && p.x + p.y <= 1.0)
     };
     let at = |k: usize| from + (to - from) * k as f64 / SAMPLES as f64;
     let mut before = above(at(0));
@@ -48,7 +53,10 @@ fn oracle(patch: &Patch<'_>, ray: &Ray, bounds: Aabb) -> Option<f64> {
                     high = middle
                 }
             }
-            return Some(0.5 * (low + high));
+            let t = 0.5 * (low + high);
+            if inside(t) {
+                return Some(t);
+            }
         }
         before = now;
     }
@@ -126,6 +134,11 @@ fn any_ray() -> impl Strategy<Value = Ray> {
         })
 }
 
+/// In or out, by enough to be seen.
+fn any_scale() -> impl Strategy<Value = f32> {
+    prop_oneof![-0.3f32..-0.01, 0.01f32..0.3]
+}
+
 fn agree(prisms: &Prisms, ray: &Ray) -> Result<(), TestCaseError> {
     let patch = prisms.surface().patch(0);
     let want = oracle(&patch, ray, prisms.bounds(0));
@@ -197,9 +210,8 @@ proptest! {
 
     #[test]
     fn regular_prisms_agree_with_the_oracle(
-        mesh in tilted(0.4), ray in any_ray(), scale in -0.3f32..0.3, midlevel in 0.0f32..1.0, size in 4usize..12,
+        mesh in tilted(0.4), ray in any_ray(), scale in any_scale(), midlevel in 0.0f32..1.0, size in 4usize..12,
     ) {
-        prop_assume!(scale.abs() > 0.01);
         let displacement = Displacement { scale, midlevel, uv: UvTransform::default() };
         let surface = surface(mesh, noise_map(size, Wrap::Repeat), displacement);
         for prisms in levels(&surface, FINE) {
