@@ -348,35 +348,47 @@ fn is_folded(patch: &Patch<'_>, [low, high]: [f64; 2]) -> bool {
 
 /// The base triangles in groups of [`LANES`] that lie near one another; only the last group may be smaller.
 ///
-/// Median cuts along the longest side of the centroids' box, at multiples of the group's size.
+/// Median cuts at multiples of the group's size, along the axis that leaves the two halves the smallest boxes.
 pub fn groups(centroids: &[DVec3]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..centroids.len() as u32).collect();
     let mut waiting = vec![(0, order.len())];
     while let Some((start, end)) = waiting.pop() {
-        let range = start..end;
-        if range.len() <= LANES {
-            order[range].sort_unstable();
+        let part = &mut order[start..end];
+        if part.len() <= LANES {
+            part.sort_unstable();
             continue;
         }
-        let part = &mut order[range];
-        let (low, high) = part.iter().fold(
-            (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            |(low, high), &prim| {
-                let p = centroids[prim as usize];
-                (low.min(p), high.max(p))
-            },
-        );
-        let axis = (high - low).max_position();
         let half = part.len().div_ceil(2).next_multiple_of(LANES);
-        let key = |prim: u32| (centroids[prim as usize][axis], prim);
-        part.select_nth_unstable_by(half, |&a, &b| {
-            let ((x, i), (y, j)) = (key(a), key(b));
-            x.total_cmp(&y).then(i.cmp(&j))
-        });
+        let mut cut = |axis: usize| {
+            let key = |prim: u32| (centroids[prim as usize][axis], prim);
+            part.select_nth_unstable_by(half, |&a, &b| {
+                let ((x, i), (y, j)) = (key(a), key(b));
+                x.total_cmp(&y).then(i.cmp(&j))
+            });
+            half_area(&part[..half], centroids) + half_area(&part[half..], centroids)
+        };
+        let costs = [cut(0), cut(1), cut(2)];
+        let axis = DVec3::from(costs).min_position();
+        if axis != 2 {
+            cut(axis);
+        }
         waiting.push((start, start + half));
         waiting.push((start + half, end));
     }
     order
+}
+
+/// Half the surface of the box around some centroids.
+fn half_area(prims: &[u32], centroids: &[DVec3]) -> f64 {
+    let (low, high) = prims.iter().fold(
+        (DVec3::INFINITY, DVec3::NEG_INFINITY),
+        |(low, high), &prim| {
+            let p = centroids[prim as usize];
+            (low.min(p), high.max(p))
+        },
+    );
+    let size = high - low;
+    size.dot(DVec3::new(size.y, size.z, size.x))
 }
 
 #[cfg(test)]

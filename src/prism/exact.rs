@@ -4,7 +4,7 @@ use super::cluster::{Cluster, MOST_PRISMS, groups};
 use super::detail::turned;
 use super::edits::EditBounds;
 use super::march::exact::{
-    Arcs, Found, FoundArcs, Problem, Search, Units, root, search_arc, walls,
+    Arcs, CutArcs, Found, FoundArcs, Problem, Search, Units, root, search_arc, walls,
 };
 use super::ray_frame::{Anchored, RayFrame, axes};
 use super::sight::Sight;
@@ -60,54 +60,78 @@ impl ExactPrisms {
     }
 }
 
-/// A cluster that a ray may meet.
-struct Meeting<'a> {
+/// A cluster, and a ray in its frame, from a point beside the cluster.
+struct Approach<'a> {
     prisms: &'a Prisms,
     cluster: &'a Cluster,
+    /// Lanes with a prism.
+    used: u32,
     frame: RayFrame,
     ray: Anchored,
-    arcs: Arcs,
-    found: FoundArcs,
 }
 
-impl<'a> Meeting<'a> {
-    /// `None` where the ray meets no prism of it.
+impl<'a> Approach<'a> {
     #[inline(always)]
-    fn new<L: Lanes>(prisms: &'a Prisms, index: u32, ray: &Ray) -> Option<Self> {
+    fn new(prisms: &'a Prisms, index: u32, ray: &Ray) -> Option<Self> {
         let Parts::Exact(exact) = &prisms.parts else {
             return None;
         };
         let cluster = &exact.clusters[index as usize];
         let frame = RayFrame::new(ray, axes(ray));
-        let ray = frame.anchored(cluster.anchor(frame.axes[2]), ray);
-        let (sight, met) = Sight::<L>::new(cluster, &ray);
-        let met = met & ((1 << exact.len(index as usize)) - 1);
-        if met == 0 {
-            return None;
-        }
-        let (_, normals, _) = cluster.lanes::<L>(ray.axes);
-        let units = Units::new(&prisms.surface);
-        let (arcs, found) =
-            Arcs::seen(&sight, met, cluster.texcoord_lanes(), normals, &units, &ray);
-        // Level of detail is decided on curves of f64.
-        let others = if ray.is_usual && prisms.spread() == 0.0 {
-            found.others | met & cluster.folded::<L>()
-        } else {
-            met
-        };
         Some(Self {
             prisms,
             cluster,
+            used: (1 << exact.len(index as usize)) - 1,
+            ray: frame.anchored(cluster.anchor(frame.axes[2]), ray),
             frame,
-            ray,
+        })
+    }
+
+    /// The arcs in the lanes `met`. Lanes are handed on as they are: moves of them are not free.
+    #[inline(always)]
+    fn cut<L: Lanes>(&self, sight: &Sight<L>) -> (CutArcs<L>, Units) {
+        let (_, normals, _) = self.cluster.lanes::<L>(self.ray.axes);
+        let units = Units::new(&self.prisms.surface);
+        let texcoords = self.cluster.texcoord_lanes();
+        let cut = CutArcs::new(sight, texcoords, normals, &units, &self.ray);
+        (cut, units)
+    }
+
+    /// The arcs that are to be walked in the lanes `met`.
+    #[inline(always)]
+    fn meeting<'s, L: Lanes>(&'s self, cut: &CutArcs<L>, arcs: &'s Arcs, met: u32) -> Meeting<'s> {
+        let found = cut.found(arcs, met, &self.ray);
+        // Level of detail is decided on curves of f64.
+        let others = if self.ray.is_usual && self.prisms.spread() == 0.0 {
+            found.others | met & self.cluster.folded::<L>()
+        } else {
+            met
+        };
+        Meeting {
+            prisms: self.prisms,
+            cluster: self.cluster,
+            frame: &self.frame,
+            ray: &self.ray,
             arcs,
             found: FoundArcs {
                 arcs: found.arcs & !others,
                 others,
             },
-        })
+        }
     }
+}
 
+/// A cluster with the arcs of a ray through it.
+struct Meeting<'s> {
+    prisms: &'s Prisms,
+    cluster: &'s Cluster,
+    frame: &'s RayFrame,
+    ray: &'s Anchored,
+    arcs: &'s Arcs,
+    found: FoundArcs,
+}
+
+impl Meeting<'_> {
     /// The ray parameter, from the anchor, at which a lane's arc begins; before all others where that is not known.
     #[inline(always)]
     fn begin(&self, lane: usize) -> f32 {
@@ -144,11 +168,11 @@ impl<'a> Meeting<'a> {
     #[inline(always)]
     fn search<L: Lanes>(&self, problem: &Problem<'_>) -> Option<Found> {
         if self.found.arcs >> problem.lane & 1 != 0 {
-            search_arc::<L>(problem, &self.frame, &self.arcs, self.ray.time)
+            search_arc::<L>(problem, self.frame, self.arcs, self.ray.time)
         } else {
             L::outline(Search {
                 problem,
-                frame: &self.frame,
+                frame: self.frame,
             })
         }
     }
@@ -162,7 +186,15 @@ impl<'a> Meeting<'a> {
 /// The first hit on a cluster.
 #[inline(always)]
 pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<PrismHit> {
-    let meeting = Meeting::new::<L>(prisms, index, ray)?;
+    let approach = Approach::new(prisms, index, ray)?;
+    let (sight, met) = Sight::<L>::new(approach.cluster, &approach.ray);
+    let met = met & approach.used;
+    if met == 0 {
+        return None;
+    }
+    let (cut, units) = approach.cut(&sight);
+    let arcs = cut.bounded(&units);
+    let meeting = approach.meeting(&cut, &arcs, met);
     let cluster = meeting.cluster;
     let mut interval = [ray.tnear, ray.tfar];
     let mut nearest: Option<(Found, usize)> = None;
@@ -186,7 +218,7 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
             }
         }
         if cluster.walls(lane) != 0
-            && let Some(found) = walls::<L>(&meeting.problem(lane, interval, false), &meeting.frame)
+            && let Some(found) = walls::<L>(&meeting.problem(lane, interval, false), meeting.frame)
             && wall.is_none_or(|best| found.is_before(&best))
         {
             wall = Some(found);
@@ -215,16 +247,24 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
 /// Whether a cluster is hit at all.
 #[inline(always)]
 pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
-    let Some(meeting) = Meeting::new::<L>(prisms, index, ray) else {
+    let Some(approach) = Approach::new(prisms, index, ray) else {
         return false;
     };
+    let (sight, met) = Sight::<L>::new(approach.cluster, &approach.ray);
+    let met = met & approach.used;
+    if met == 0 {
+        return false;
+    }
+    let (cut, units) = approach.cut(&sight);
+    let arcs = cut.bounded(&units);
+    let meeting = approach.meeting(&cut, &arcs, met);
     let mut alive = meeting.found.arcs | meeting.found.others;
     while alive != 0 {
         let lane = alive.trailing_zeros() as usize;
         alive &= alive - 1;
         let problem = meeting.problem(lane, [ray.tnear, ray.tfar], true);
         if meeting.search::<L>(&problem).is_some()
-            || meeting.cluster.walls(lane) != 0 && walls::<L>(&problem, &meeting.frame).is_some()
+            || meeting.cluster.walls(lane) != 0 && walls::<L>(&problem, meeting.frame).is_some()
         {
             return true;
         }

@@ -8,9 +8,10 @@
 //!
 //! **Never too strict.** Coordinates are relative to the [anchor](Anchored): a projected coordinate is the difference of two
 //! f32 numbers and a product with the shear, each rounded once. With u = 2^-24, R the largest projected coordinate, d
-//! the largest depth from the anchor and W the largest |w|, it is off by at most u (3R + 4d) for a, 2u W for w e, u R for their sum and 6u W
-//! for w itself, where the range is cut: c = 4u (R + d) + 9u W is above that. A cross product of two is off by
-//! 4 R c and its own roundings of less than 6u R^2. The slack is the sum.
+//! the largest depth from the anchor, m the largest shear (at most 1) and W the largest |w|, it is off by at most u (3R + 4md) for a, 2.5u W for
+//! w e and u R for their sum: c = 4u (R + md) + 2.5u W. A cross product of two is off by 4 R c and its own roundings of
+//! less than 6u R^2. The slack is the sum. Depths are off by at most u (2d + W) at both ends of the range, and by 6u W more between
+//! them, where w is rounded.
 
 use super::cluster::Cluster;
 use super::ray_frame::Anchored;
@@ -27,8 +28,9 @@ pub struct Sight<L> {
     pub areas: [[L; 3]; 3],
     /// How far these are off at most.
     pub off: L,
-    /// How far a projected coordinate is.
-    pub coordinate: L,
+    /// How far a depth is, at any w, and w at most.
+    pub depth_off: L,
+    pub reach: L,
     /// Depths between which all of a prism lies.
     pub nearest: L,
     pub farthest: L,
@@ -68,7 +70,10 @@ impl<L: Lanes> Sight<L> {
         }
         let reach = low.abs().max(high.abs());
         let unit = L::splat(f32::EPSILON);
-        let coordinate = (reach * L::splat(4.5) + (widest + deepest) * L::splat(2.0)) * unit;
+        let shear = L::splat(ray.shear[0].abs().max(ray.shear[1].abs()));
+        let lateral = shear.mul_add(deepest, widest) * L::splat(2.0);
+        let coordinate = reach.mul_add(L::splat(1.25), lateral) * unit;
+        let depth_off = reach.mul_add(L::splat(3.5), deepest) * unit;
         let off = widest * (coordinate * L::splat(4.5) + widest * unit * L::splat(3.0));
         let areas = [
             bernstein([at_low[1], at_low[2]], [at_high[1], at_high[2]]),
@@ -82,7 +87,7 @@ impl<L: Lanes> Sight<L> {
 
         let per_depth = L::splat(ray.per_depth);
         let (t0, t1) = (nearest * per_depth, farthest * per_depth);
-        let slack = coordinate * per_depth.abs() * L::splat(2.0);
+        let slack = depth_off * per_depth.abs() * L::splat(2.0);
         let [tnear, tfar] = ray.interval;
         let too_early = (t0.max(t1) + slack - L::splat(tnear)).sign_mask();
         let too_late = (L::splat(tfar) - (t0.min(t1) - slack)).sign_mask();
@@ -93,7 +98,8 @@ impl<L: Lanes> Sight<L> {
             slopes,
             areas,
             off,
-            coordinate,
+            depth_off,
+            reach,
             nearest,
             farthest,
         };

@@ -38,16 +38,19 @@ pub struct PatchPoint {
 
 impl Patch<'_> {
     /// P(b) = sum b_i v_i.
+    #[inline(always)]
     pub fn base(&self, u: f64, v: f64) -> DVec3 {
         weighted(&self.vertices, u, v)
     }
 
     /// N'(b) = sum b_i n_i, not normalised.
+    #[inline(always)]
     pub fn normal(&self, u: f64, v: f64) -> DVec3 {
         weighted(&self.normals, u, v)
     }
 
     /// Texel coordinates at b.
+    #[inline(always)]
     pub fn texel(&self, u: f64, v: f64) -> DVec2 {
         let t = &self.texels;
         t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0])
@@ -136,11 +139,13 @@ impl Patch<'_> {
 
     /// S, dS/du and dS/dv at b:
     /// dS = dA + dD N, dA = dP + D (dN' - N (N . dN')) / |N'| with N = N'/|N'|.
+    #[inline(always)]
     pub fn point(&self, u: f64, v: f64) -> PatchPoint {
         self.point_of(self.map.sample(self.texel(u, v)), u, v)
     }
 
     /// The same for another height and gradient of the map there.
+    #[inline(always)]
     pub fn point_of(&self, sample: HeightSample, u: f64, v: f64) -> PatchPoint {
         let displacement = self.scale * (sample.height - self.midlevel);
         let raw_normal = self.normal(u, v);
@@ -172,6 +177,7 @@ pub(crate) fn solve([a, b, c]: [DVec3; 3], r: DVec3) -> Option<DVec3> {
     x.is_finite().then_some(x)
 }
 
+#[inline(always)]
 fn weighted(x: &[DVec3; 3], u: f64, v: f64) -> DVec3 {
     x[0] + u * (x[1] - x[0]) + v * (x[2] - x[0])
 }

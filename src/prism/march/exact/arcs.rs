@@ -1,14 +1,13 @@
 //! The curves of a ray through eight prisms in f32, one lane each, with what bounds them.
 //!
 //! An arc is the part of a ray's curve ([`curve`](crate::prism::curve)) that is walked: s in [0, 1] runs over it in the order of t.
-//! [`Arcs::seen`] makes the arcs of a cluster from what a ray [sees](crate::prism::sight) of it, cut where the ray is surely
+//! [`Cut`] makes the arcs of a cluster from what a ray [sees](crate::prism::sight) of it, cut where the ray is surely
 //! outside: a hair too long rather than too short, so that points of the arc may lie outside the prism. Where
 //! f32 will not do, and where a prism is folded, [`Arcs::of_curve`] takes a curve that was set up in f64.
 
 mod bounds;
 
 use super::Problem;
-use super::span::CLOSE;
 use crate::prism::curve::{Curve, View};
 use crate::prism::ray_frame::Anchored;
 use crate::prism::sight::Sight;
@@ -18,6 +17,9 @@ use bounds::{Lanewise, Uncertain};
 
 /// The smallest A of an arc, as a part of its largest.
 const EVEN: f32 = 0.25;
+
+/// The largest rounding of an arc, in texels. Larger ones would only mean more looks in f64.
+const FINE: f32 = 1.0 / 16.0;
 
 /// One number for each lane.
 type Row = [f32; LANES];
@@ -94,17 +96,26 @@ pub struct Found {
     pub others: u32,
 }
 
-impl Arcs {
-    /// The arcs in the lanes `met` of a cluster.
+/// The arcs of a cluster before they are [bounded](Self::bounded).
+pub struct Cut<L> {
+    arcs: Lanewise<L>,
+    uncertain: Uncertain<L>,
+    /// How far A is above what f32 will do for, at its smallest.
+    even: L,
+    /// Lanes of which the ray is surely outside.
+    empty: u32,
+}
+
+impl<L: Lanes> Cut<L> {
+    /// The arcs of a cluster.
     #[inline(always)]
-    pub fn seen<L: Lanes>(
+    pub fn new(
         sight: &Sight<L>,
-        met: u32,
         texcoords: [[L; 2]; 3],
         normals: [[L; 3]; 3],
         units: &Units,
         ray: &Anchored,
-    ) -> (Self, Found) {
+    ) -> Self {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let off = sight.off;
         // Twice the area of the offset triangle: positive from here on.
@@ -179,36 +190,50 @@ impl Arcs {
                 squared_distance(n1, n2),
             ],
             time,
+            w: [w0, w1],
         };
         let extent = |p: L, q: L| p.max(q).max(zero) - p.min(q).min(zero);
         let per_depth = per_depth.abs();
-        let mut rows = arcs.bounded(
-            units,
-            &Uncertain {
+        Self {
+            arcs,
+            uncertain: Uncertain {
                 area: off * L::splat(2.5),
                 texels: extent(x1, x2).max(extent(y1, y2)),
                 time: (sight.farthest - sight.nearest) * per_depth,
-                time_off: sight.coordinate * per_depth * L::splat(2.0),
+                time_off: sight.depth_off * per_depth * L::splat(2.0),
+                height: sight.reach * per_world.abs() * L::splat(2.0 * f32::EPSILON),
             },
-        );
-        rows.w = [w0.to_array(), w1.to_array()];
+            even,
+            empty,
+        }
+    }
 
-        let (begins, ends) = (L::from_array(rows.ends[0]), L::from_array(rows.ends[1]));
-        let time_off = L::from_array(rows.time_off);
+    #[inline(always)]
+    pub fn bounded(&self, units: &Units) -> Arcs {
+        self.arcs.bounded(units, &self.uncertain)
+    }
+
+    /// What is to be walked of the lanes `met` of `arcs`, which are this.
+    #[inline(always)]
+    pub fn found(&self, arcs: &Arcs, met: u32, ray: &Anchored) -> Found {
+        let (begins, ends) = (L::from_array(arcs.ends[0]), L::from_array(arcs.ends[1]));
+        let time_off = L::from_array(arcs.time_off);
         let too_early = (ends + time_off - L::splat(ray.interval[0])).sign_mask();
         let too_late = (L::splat(ray.interval[1]) - (begins - time_off)).sign_mask();
         // What is no number is not good enough either, nor what was divided by an A below 0.
-        let rounding = L::from_array(rows.rounding).min(L::splat(f32::MAX));
-        let coarse = (L::splat(CLOSE) - rounding).sign_mask() | rounding.sign_mask();
-        let uneven = even.max(L::splat(-1.0)).sign_mask();
-        let others = met & (uneven | coarse);
-        let found = Found {
-            arcs: met & !others & !empty & !too_early & !too_late,
+        let rounding = L::from_array(arcs.rounding).min(L::splat(f32::MAX));
+        let coarse = (L::splat(FINE) - rounding).sign_mask() | rounding.sign_mask();
+        let uneven = self.even.max(L::splat(-1.0)).sign_mask();
+        // Where A is surely of one sign, so is what is outside, however coarse the rest.
+        let others = met & (uneven | coarse & !self.empty);
+        Found {
+            arcs: met & !others & !self.empty & !too_early & !too_late,
             others,
-        };
-        (rows, found)
+        }
     }
+}
 
+impl Arcs {
     /// The arc that is all of a curve, in every lane. Texel coordinates are from the curve's base, ray parameters from `start`.
     #[inline(always)]
     pub fn of_curve<L: Lanes>(
@@ -254,18 +279,18 @@ impl Arcs {
                 L::splat(time[2] as f32),
                 L::splat(time[3] as f32),
             ],
+            w: [L::splat(w as f32), L::splat((w + dw) as f32)],
         };
-        let mut rows = arcs.bounded(
+        arcs.bounded(
             &units,
             &Uncertain {
                 area: zero,
                 texels: zero,
                 time: zero,
                 time_off: zero,
+                height: zero,
             },
-        );
-        rows.w = [[w as f32; LANES], [(w + dw) as f32; LANES]];
-        rows
+        )
     }
 }
 

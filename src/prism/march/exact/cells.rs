@@ -221,8 +221,14 @@ impl Chord {
             let sure = |f: f32| f.abs() > of(&cells.off, lane);
             let certain = sure(f0) && sure(end) && (f0 > 0.0) != (end > 0.0);
             let (from, to) = (s(start), s(start + length));
-            if certain && signs.any_will_do() && walker.is_surely_within(from as f32, to as f32) {
-                return signs.found_any();
+            let root = s(start + length * root(f0, f1, f2));
+            if certain && let Some(times) = walker.surely_within(from as f32, to as f32) {
+                if signs.any_will_do() {
+                    return signs.found_any();
+                }
+                if signs.land::<L>(&walker.guess(root as f32, times, f0 > 0.0)) {
+                    return;
+                }
             }
             // Between the last point and this lane nothing is crossed: only the first lane needs its beginning.
             if signs.is_fresh() {
@@ -230,7 +236,6 @@ impl Chord {
                 let begin = signs.look::<L>(from, side);
                 signs.point::<L>(begin, from);
             }
-            let root = s(start + length * root(f0, f1, f2));
             if certain {
                 signs.point::<L>((to, end > 0.0), root);
             } else {

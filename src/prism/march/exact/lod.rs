@@ -62,7 +62,13 @@ fn middle<Q: Quad>(
     let [t, u, v] = curve.seen(0.5 * (from + to));
     let most = 0.5 * f64::from(problem.spread) * start;
     let is_good = start > f64::from(problem.interval[0]) && (t - start).max(end - t) <= most;
-    is_good.then_some(Found { t, u, v, above })
+    is_good.then_some(Found {
+        t,
+        u,
+        v,
+        above,
+        ng: None,
+    })
 }
 
 /// Ends the search in the first run of children that may meet the surface, if that is short enough and crosses it; or says that it does not.

@@ -12,6 +12,7 @@ mod arcs;
 mod cells;
 mod children;
 mod explain;
+mod landing;
 mod lod;
 mod pieces;
 mod roots;
@@ -19,13 +20,15 @@ mod signs;
 mod span;
 mod walls;
 
+use glam::DVec3;
+
 use super::polish::Root;
 use crate::prism::cluster::Cluster;
 use crate::prism::curve::{Curve, Cut, Stretch, View};
 use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::{Lanes, Quad, Task};
 use crate::surface::{DisplacedSurface, Patch};
-pub use arcs::{Arcs, Found as FoundArcs, Units};
+pub use arcs::{Arcs, Cut as CutArcs, Found as FoundArcs, Units};
 pub use explain::explain;
 use pieces::Piece;
 use signs::Signs;
@@ -77,6 +80,8 @@ pub struct Found {
     pub v: f64,
     /// Whether the ray comes from above.
     pub above: bool,
+    /// dS/du x dS/dv, where that has been asked for already.
+    pub ng: Option<DVec3>,
 }
 
 /// The first crossing on an arc that f32 set up, or any.
@@ -282,26 +287,24 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
 /// The hit on S at a crossing.
 #[inline(always)]
 pub fn root<L: Lanes>(problem: &Problem<'_>, found: &Found) -> Root {
-    L::outline(OnSurface { problem, found })
+    let Found { t, u, v, ng, .. } = *found;
+    let ng = match ng {
+        Some(ng) => ng,
+        None => L::outline(Normal { problem, found }),
+    };
+    Root { t, u, v, ng }
 }
 
-struct OnSurface<'a> {
+struct Normal<'a> {
     problem: &'a Problem<'a>,
     found: &'a Found,
 }
 
-impl<L: Lanes> Task<L> for OnSurface<'_> {
-    type Output = Root;
+impl<L: Lanes> Task<L> for Normal<'_> {
+    type Output = DVec3;
 
     #[inline(always)]
-    fn run(self) -> Root {
-        let Found { t, u, v, .. } = *self.found;
-        let point = self.problem.patch().point(u, v);
-        Root {
-            t,
-            u,
-            v,
-            ng: point.ng,
-        }
+    fn run(self) -> DVec3 {
+        self.problem.patch().point(self.found.u, self.found.v).ng
     }
 }

@@ -5,6 +5,7 @@ use crate::prism::simd::Quad;
 use crate::surface::Patch;
 
 use super::Found;
+use super::span::CLOSE;
 
 /// g and its derivative by s.
 pub struct Height {
@@ -63,8 +64,8 @@ pub struct Breaks {
 impl Breaks {
     #[inline(always)]
     pub fn new<Q: Quad>(curve: &Curve<Q>, [from, to]: [f64; 2]) -> Self {
-        /// Texels by which a curve may leave the box of two points: a bit more than its distance from their chord.
-        const BEYOND: f64 = 1.0 / 64.0;
+        // A curve may leave the box of two points by its distance from their chord.
+        const BEYOND: f64 = CLOSE as f64;
         let mut breaks = Self {
             all: [to; 4 * MOST_LINES + 1],
             count: 1,
@@ -198,5 +199,11 @@ pub fn crossing<Q: Quad>(
         }
     }
     let [t, u, v] = curve.seen(s);
-    Found { t, u, v, above }
+    Found {
+        t,
+        u,
+        v,
+        above,
+        ng: None,
+    }
 }

@@ -9,6 +9,7 @@ use crate::prism::curve::{Curve, View};
 use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::{Lanes, Quad, Task};
 
+use super::landing::{Guess, land};
 use super::roots::{Breaks, crossing, dip, height};
 use super::{Found, Problem};
 
@@ -158,8 +159,22 @@ impl<'a, Q: Quad> Signs<'a, Q> {
             u: 0.0,
             v: 0.0,
             above: true,
+            ng: None,
         });
         self.done = true;
+    }
+
+    /// Ends the search at a crossing between two points whose sides are certain; `false` where signs must find it.
+    #[inline(always)]
+    pub fn land<L: Lanes<Quad = Q>>(&mut self, guess: &Guess) -> bool {
+        if !self.problem.is_ordered() || self.above.is_some_and(|above| above != guess.above) {
+            return false;
+        }
+        let Some(found) = L::outline(Landing { signs: self, guess }) else {
+            return false;
+        };
+        self.end_with(found);
+        true
     }
 
     /// Ends the search at a crossing, or without one where that is outside the ray's interval.
@@ -231,6 +246,20 @@ impl Side {
     #[inline(always)]
     pub fn of(f: f32) -> Self {
         if f > 0.0 { Self::Above } else { Self::Below }
+    }
+}
+
+struct Landing<'s, 'a, Q> {
+    signs: &'s Signs<'a, Q>,
+    guess: &'s Guess,
+}
+
+impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Landing<'_, '_, Q> {
+    type Output = Option<Found>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Found> {
+        land(&self.signs.problem.patch(), self.signs.frame, self.guess)
     }
 }
 

@@ -11,6 +11,7 @@ use super::Problem;
 use super::arcs::Arcs;
 use super::cells::{Chord, MOST_CELLS, Off};
 use super::children::{Ends, Stack, at, of};
+use super::landing::Guess;
 use super::lod::settle;
 use super::signs::{Side, Signs};
 use crate::prism::simd::{Grid, LANES, Lanes, Quad, Task};
@@ -33,6 +34,8 @@ pub struct Walker<'a> {
     grid: Grid<'a>,
     /// The arc's texel base, within one period of the map.
     base: [f32; 2],
+    /// The arc's point of reference in ray parameters.
+    time_base: f64,
     /// The parameters between which crossings are looked for.
     whole: [f32; 2],
     /// tnear and tfar from the arc's point of reference in time, narrowed by all doubt.
@@ -93,25 +96,26 @@ impl<'a> Walker<'a> {
             origin: [(texel[0] - base[0]) as f32, (texel[1] - base[1]) as f32],
             midlevel: grid.unit() * problem.surface.displacement().midlevel,
             base: grid.base(base),
+            time_base: time,
             grid,
             whole: [0.0, 1.0],
             surely: [f32::NEG_INFINITY, f32::INFINITY],
             caps: [None; 2],
         };
         if problem.is_ordered() {
-            walker.clip(time);
+            walker.clip();
         }
         walker
     }
 
     /// Leaves out what is surely before tnear or behind tfar.
     #[inline(always)]
-    fn clip(&mut self, time: f64) {
+    fn clip(&mut self) {
         let [tnear, tfar] = self.problem.interval;
         let off = self.arcs.time_off[self.lane];
         let (begin, end) = (self.arcs.ends[0][self.lane], self.arcs.ends[1][self.lane]);
-        let near = (f64::from(tnear) - time) as f32;
-        let far = (f64::from(tfar) - time) as f32;
+        let near = (f64::from(tnear) - self.time_base) as f32;
+        let far = (f64::from(tfar) - self.time_base) as f32;
         // Hits are compared in single precision; an infinite tfar stays what it is.
         let rounding =
             |t: f32, from_there: f32| ((t.abs() + from_there.abs()) * f32::EPSILON).min(f32::MAX);
@@ -156,9 +160,10 @@ impl<'a> Walker<'a> {
         (c0[l] + s * (c1[l] + s * (c2[l] + s * c3[l]))) / (a0[l] + s * (a1[l] + s * a2[l]))
     }
 
-    /// Whether all points between two parameters less than a chord apart are surely inside the prism and the ray's interval.
+    /// The ray parameters at two parameters less than a chord apart, where all points between them are surely inside the prism and the
+    /// ray's interval.
     #[inline(always)]
-    pub fn is_surely_within(&self, from: f32, to: f32) -> bool {
+    pub fn surely_within(&self, from: f32, to: f32) -> Option<[f32; 2]> {
         let l = self.lane;
         let [u0, u1, u2] = &self.arcs.u;
         let [v0, v1, v2] = &self.arcs.v;
@@ -176,9 +181,31 @@ impl<'a> Walker<'a> {
             .min(least(v0[l], v1[l], v2[l]))
             .min(least(p0, p1, p2));
         let area = (a0[l] + from * (a1[l] + from * a2[l])).abs();
-        inside > 3.0 * self.arcs.inside_off[l] * area
-            && self.time(from) > self.surely[0]
-            && self.time(to) < self.surely[1]
+        let times = [self.time(from), self.time(to)];
+        (inside > 3.0 * self.arcs.inside_off[l] * area
+            && times[0] > self.surely[0]
+            && times[1] < self.surely[1])
+            .then_some(times)
+    }
+
+    /// A crossing at s, between two ray parameters, that comes from above or not.
+    #[inline(always)]
+    pub fn guess(&self, s: f32, times: [f32; 2], above: bool) -> Guess {
+        let l = self.lane;
+        let at = |[c0, c1, c2]: &[[f32; LANES]; 3]| c0[l] + s * (c1[l] + s * c2[l]);
+        let area = at(&self.arcs.area);
+        let off = f64::from(self.arcs.time_off[l]);
+        Guess {
+            uv: [
+                f64::from(at(&self.arcs.u) / area),
+                f64::from(at(&self.arcs.v) / area),
+            ],
+            t: [
+                self.time_base + f64::from(times[0]) - off,
+                self.time_base + f64::from(times[1]) + off,
+            ],
+            above,
+        }
     }
 
     /// Reports to `signs` every point of the arc at which the surface may be crossed, in order.

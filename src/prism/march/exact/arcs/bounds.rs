@@ -9,7 +9,7 @@
 //! and of the set-up: with every Q_i off by at most q, sum b_i x_i is off by sum |x_i - x| q / A <= 2 q (max x_i - min x_i) / A.
 
 use super::{Arcs, Rows3, Units};
-use crate::prism::simd::{LANES, Lanes};
+use crate::prism::simd::Lanes;
 
 /// An f32 value is within this many units in the last place of the magnitudes it was computed from.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
@@ -24,6 +24,7 @@ pub struct Lanewise<L> {
     pub height: [L; 2],
     pub spread: [L; 3],
     pub time: [L; 4],
+    pub w: [L; 2],
 }
 
 /// What the set-up of arcs left uncertain.
@@ -35,6 +36,8 @@ pub struct Uncertain<L> {
     pub time: L,
     /// Ray parameters beside that.
     pub time_off: L,
+    /// Heights, for w.
+    pub height: L,
 }
 
 impl<L: Lanes> Lanewise<L> {
@@ -81,7 +84,7 @@ impl<L: Lanes> Lanewise<L> {
         let height_rounding = highest.mul_add(
             unsure,
             (highest + L::splat(units.midlevel.abs())) * L::splat(ROUNDING),
-        );
+        ) + uncertain.height * stretch;
 
         let [c0, c1, c2, c3] = self.time;
         let last = c0 + c1 + c2 + c3;
@@ -95,7 +98,7 @@ impl<L: Lanes> Lanewise<L> {
             u: stored(self.u),
             v: stored(self.v),
             area: stored(self.area),
-            w: [[0.0; LANES]; 2],
+            w: [self.w[0].to_array(), self.w[1].to_array()],
             height: [h0.to_array(), h1.to_array()],
             spread: stored(self.spread),
             time: [c0.to_array(), c1.to_array(), c2.to_array(), c3.to_array()],
