@@ -114,8 +114,8 @@ prismarch_status prismarch_map_size(const prismarch_map *map, uint32_t *width, u
 prismarch_status prismarch_map_update(prismarch_map *map, uint32_t x, uint32_t y, uint32_t width, uint32_t height,
                                       const prismarch_texels *texels, bool *commit_needed, prismarch_error *error);
 prismarch_status prismarch_map_retain(prismarch_map *map);
-/* NULL is allowed. The last release frees it, once no surface has it. One too many is noticed (PRISMARCH_ERROR_HANDLE) unless the
- * memory serves for something else already. */
+/* NULL is allowed. The last release frees it, once no surface has it. One too many is PRISMARCH_ERROR_HANDLE (unless a new handle has
+ * got the same address). */
 prismarch_status prismarch_map_release(prismarch_map *map);
 
 /* Surfaces ------------------------------------------------------------------------------------------ */
@@ -248,10 +248,18 @@ typedef struct prismarch_closest_point {
 } prismarch_closest_point;
 
 /* rtcPointQuery over the surfaces attached to a committed scene itself (instances in it are not entered; other geometries are not asked).
- * *found: whether there is a point no further than `radius`; only then *point is written. In searches of your own through rtcPointQuery
- * surfaces take no part: Embree tells a geometry's callback nothing of the geometry. */
+ * *found: whether there is a point no further than `radius`; only then *point is written. */
 prismarch_status prismarch_closest(struct RTCSceneTy *scene, const float position[3], float radius, float time, bool *found,
                                    prismarch_closest_point *point, prismarch_error *error);
+
+/* The same for one primitive of Embree's: for your own RTCPointQueryFunction, which rtcPointQuery calls with each primitive near the
+ * point. Its args->primID is, for a geometry of prismarch's, up to eight base triangles; pass it as `primitive`, args->query's x, y, z,
+ * radius and time, and args->context->inst2world[instStackSize - 1] (sixteen floats) as `to_world`, or NULL where the stack is empty. Where
+ * *found, shrink args->query->radius to point->distance and return true. Distances are those of the world, under any transform.
+ * point->geom_id is RTC_INVALID_GEOMETRY_ID: you have it in args. */
+prismarch_status prismarch_surface_closest(const prismarch_surface *surface, uint32_t primitive, const float position[3],
+                                           float radius, float time, const float to_world[16], bool *found,
+                                           prismarch_closest_point *point, prismarch_error *error);
 
 #ifdef __cplusplus
 }

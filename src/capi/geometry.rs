@@ -1,9 +1,9 @@
-//! Surfaces in Embree: `prismarch_geometry_*`, `prismarch_closest`.
+//! Surfaces in Embree: `prismarch_geometry_*`, `prismarch_closest`, `prismarch_surface_closest`.
 
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use glam::Vec3;
+use glam::{Affine3A, Mat4, Vec3};
 
 use super::declarations::{
     self as c, RTCDeviceTy, RTCGeometryTy, RTCSceneTy, prismarch_closest_point, prismarch_error,
@@ -12,7 +12,10 @@ use super::declarations::{
 use super::error::{Failure, answer};
 use super::handle::{Handle, output};
 use super::surface::Surface;
+use crate::embree::HitTest;
 use crate::embree::raw::{self, RawGeometry};
+use crate::surface::{ClosestPoint, PointQuery};
+use crate::trace::INVALID_ID;
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn prismarch_geometry_create(
@@ -74,33 +77,101 @@ pub unsafe extern "C" fn prismarch_closest(
     unsafe {
         answer(error, || {
             let scene = NonNull::new(scene).ok_or_else(|| Failure::null("scene"))?;
-            if position.is_null() {
-                return Err(Failure::null("position"));
-            }
             let (found, out) = (output(found, "found")?, output(point, "point")?);
-            let position = Vec3::from_array(position.cast::<[f32; 3]>().read_unaligned());
-            if !position.is_finite()
-                || radius.is_nan()
-                || radius < 0.0
-                || !(0.0..=1.0).contains(&time)
-            {
-                return Err(Failure::argument(format!(
-                    "position {position}, radius {radius}, time {time}; expected finite numbers, at least 0, and 0 to 1"
-                )));
-            }
-            let nearest = raw::closest(scene.cast(), position, radius, time);
+            let query = query(position, radius, time, std::ptr::null())?;
+            let nearest = raw::closest(scene.cast(), query.point, radius, time);
             *found = nearest.is_some();
             if let Some((nearest, geom_id)) = nearest {
-                *out = prismarch_closest_point {
-                    distance: nearest.distance,
-                    position: nearest.point.to_array(),
-                    u: nearest.u,
-                    v: nearest.v,
-                    prim_id: nearest.prim,
-                    geom_id,
-                };
+                *out = to_caller(&nearest, geom_id);
             }
             Ok(())
         })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn prismarch_surface_closest(
+    surface: *const c::prismarch_surface,
+    primitive: u32,
+    position: *const f32,
+    radius: f32,
+    time: f32,
+    to_world: *const f32,
+    found: *mut bool,
+    point: *mut prismarch_closest_point,
+    error: *mut prismarch_error,
+) -> prismarch_status {
+    // SAFETY: pointers as the header asks.
+    unsafe {
+        answer(error, || {
+            let surface = Handle::<Surface>::borrow(surface.cast())?;
+            let (found, out) = (output(found, "found")?, output(point, "point")?);
+            let query = query(position, radius, time, to_world)?;
+            let primitives = surface.live.len();
+            if primitive as usize >= primitives {
+                return Err(Failure::argument(format!(
+                    "primitive {primitive}; the geometry has {primitives}"
+                )));
+            }
+            let nearest = surface.live.closest(primitive, &query);
+            *found = nearest.is_some();
+            if let Some(nearest) = nearest {
+                *out = to_caller(&nearest, INVALID_ID);
+            }
+            Ok(())
+        })
+    }
+}
+
+/// A query from C.
+///
+/// # Safety
+///
+/// `position` is null or three floats, `to_world` null or sixteen.
+unsafe fn query(
+    position: *const f32,
+    radius: f32,
+    time: f32,
+    to_world: *const f32,
+) -> Result<PointQuery, Failure> {
+    if position.is_null() {
+        return Err(Failure::null("position"));
+    }
+    // SAFETY: the caller's promise.
+    let (point, to_world) = unsafe {
+        (
+            Vec3::from_array(position.cast::<[f32; 3]>().read_unaligned()),
+            match to_world.is_null() {
+                true => Mat4::IDENTITY,
+                false => Mat4::from_cols_array(&to_world.cast::<[f32; 16]>().read_unaligned()),
+            },
+        )
+    };
+    if !point.is_finite()
+        || !to_world.is_finite()
+        || radius.is_nan()
+        || radius < 0.0
+        || !(0.0..=1.0).contains(&time)
+    {
+        return Err(Failure::argument(format!(
+            "position {point}, radius {radius}, time {time}, transform {to_world}; expected finite numbers, at least 0, and 0 to 1"
+        )));
+    }
+    Ok(PointQuery {
+        point,
+        radius,
+        time,
+        to_world: Affine3A::from_mat4(to_world),
+    })
+}
+
+fn to_caller(nearest: &ClosestPoint, geom_id: u32) -> prismarch_closest_point {
+    prismarch_closest_point {
+        distance: nearest.distance,
+        position: nearest.point.to_array(),
+        u: nearest.u,
+        v: nearest.v,
+        prim_id: nearest.prim,
+        geom_id,
     }
 }

@@ -1,8 +1,9 @@
 //! Counted handles that C holds pointers to.
 
+use std::collections::BTreeMap;
 use std::ops::Deref;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::declarations::{prismarch_status, prismarch_status_PRISMARCH_OK};
 use super::error::{Failure, answer};
@@ -14,6 +15,21 @@ pub trait Kind {
     const MAGIC: u64;
     /// For messages.
     const NAME: &'static str;
+}
+
+/// How many references C holds, by address: what it holds is live, and one release too many is told without a look at memory that
+/// may be gone.
+static HELD: Mutex<BTreeMap<usize, usize>> = Mutex::new(BTreeMap::new());
+
+/// Does something with the number of C's references to `pointer`, which are forgotten at 0.
+fn counted<T, R>(pointer: *const T, change: impl FnOnce(&mut usize) -> R) -> R {
+    let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+    let count = held.entry(pointer.addr()).or_default();
+    let result = change(count);
+    if *count == 0 {
+        held.remove(&pointer.addr());
+    }
+    result
 }
 
 /// A counted object.
@@ -45,11 +61,18 @@ impl<T: Kind> Handle<T> {
         })
     }
 
+    /// One reference for C.
+    pub fn give(self: Arc<Self>) -> *const Self {
+        let pointer = Arc::into_raw(self);
+        counted(pointer, |count| *count += 1);
+        pointer
+    }
+
     /// Checks a pointer from C.
     ///
     /// # Safety
     ///
-    /// `pointer` is null, or one that [`Arc::into_raw`] gave.
+    /// `pointer` is null, or one that [`give`](Self::give) gave.
     unsafe fn checked(pointer: *const Self) -> Result<(), Failure> {
         if pointer.is_null() {
             return Err(Failure::null(T::NAME));
@@ -91,26 +114,36 @@ impl<T: Kind> Handle<T> {
         }
     }
 
-    /// One more reference for C.
+    /// One more reference for C, which must hold one.
     ///
     /// # Safety
     ///
-    /// As for `borrow`.
+    /// `pointer` is null or one that C got.
     pub unsafe fn retain(pointer: *const Self) -> prismarch_status {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller's promise; what C holds is live.
         unsafe {
             answer(std::ptr::null_mut(), || {
-                let _for_c = Arc::into_raw(Self::retained(pointer)?);
-                Ok(())
+                if pointer.is_null() {
+                    return Err(Failure::null(T::NAME));
+                }
+                counted(pointer, |count| {
+                    if *count == 0 {
+                        return Err(Failure::handle(T::NAME));
+                    }
+                    Self::checked(pointer)?;
+                    Arc::increment_strong_count(pointer);
+                    *count += 1;
+                    Ok(())
+                })
             })
         }
     }
 
-    /// One reference of C's less; null is nothing.
+    /// One reference of C's less; null is nothing, and one that C does not hold is an error.
     ///
     /// # Safety
     ///
-    /// As for `borrow`, and the reference is not used again.
+    /// `pointer` is one that C got, and the reference is not used again.
     pub unsafe fn release(pointer: *const Self) -> prismarch_status {
         if pointer.is_null() {
             return prismarch_status_PRISMARCH_OK;
@@ -118,7 +151,14 @@ impl<T: Kind> Handle<T> {
         // SAFETY: the caller's promise.
         unsafe {
             answer(std::ptr::null_mut(), || {
-                Self::checked(pointer)?;
+                counted(pointer, |count| {
+                    if *count == 0 {
+                        return Err(Failure::handle(T::NAME));
+                    }
+                    Self::checked(pointer)?;
+                    *count -= 1;
+                    Ok(())
+                })?;
                 drop(Arc::from_raw(pointer));
                 Ok(())
             })

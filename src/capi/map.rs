@@ -27,10 +27,11 @@ impl Kind for Map {
 
 impl Map {
     fn create(map: DisplacementMap) -> *const Handle<Self> {
-        Arc::into_raw(Handle::new(Self {
+        Handle::new(Self {
             map: Arc::new(map),
             surfaces: Mutex::default(),
-        }))
+        })
+        .give()
     }
 
     /// A surface that edits concern.

@@ -271,7 +271,7 @@ pub unsafe extern "C" fn prismarch_surface_create(
                 )));
             }
             let made = Handle::new(Surface::new(&*desc)?);
-            *out = Arc::into_raw(made).cast_mut().cast();
+            *out = made.give().cast_mut().cast();
             Ok(())
         })
     }

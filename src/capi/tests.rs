@@ -35,6 +35,7 @@ fn functions_have_the_types_of_the_header() {
         prismarch_geometry_set_user_data(_, _, _) in geometry;
         prismarch_geometry_user_data(_) in geometry;
         prismarch_closest(_, _, _, _, _, _, _) in geometry;
+        prismarch_surface_closest(_, _, _, _, _, _, _, _, _) in geometry;
     }
     assert_eq!(super::prismarch_version(), c::PRISMARCH_VERSION);
 }
