@@ -177,6 +177,24 @@ fn texture_coordinates_of_ten_to_the_fifteen() {
     }
 }
 
+/// A ray on a plateau of a map that is repeated a million times is on neither side of any cell of it: no ray hangs on that.
+#[test]
+fn rays_on_a_plateau_of_a_map_repeated_a_million_times() {
+    let mesh = mesh([
+        (Vec3::ZERO, Vec3::Z, Vec2::ZERO),
+        (Vec3::X, Vec3::Z, vec2(1e6, 0.0)),
+        (Vec3::Y, Vec3::Z, vec2(0.0, 1e6)),
+    ]);
+    let texels = Texels::F32(vec![0.5, 0.5, 0.5, 0.5, 0.5, 1.0]);
+    let map = DisplacementMap::new(3, 2, texels, Wrap::Mirror).unwrap();
+    let scene = Scene::exact(mesh, map, 0.25, 0.0);
+    let rays =
+        [0.0, 1e-9, -1e-9].map(|slope| Ray::new(vec3(-1.0, 0.25, 0.125), vec3(1.0, 1e-3, slope)));
+    for prisms in scene.prisms() {
+        hits(&prisms, &rays);
+    }
+}
+
 /// A triangle of 10^-17 under a displacement of 1/4: both tangents run along N to all digits.
 #[test]
 fn normals_of_triangles_tiny_beside_the_displacement() {

@@ -35,7 +35,10 @@ pub struct Signs<'a, Q> {
 
 /// Spans that one ray may look at in one prism, some millions of texels: reached only where texture coordinates repeat a
 /// map thousands of times over a triangle. What is behind is not looked for, so that no ray hangs.
-const MOST_SPANS: u32 = 1 << 16;
+const PATIENCE: u32 = 1 << 16;
+
+/// Spans that a stretch in f64 counts for: it takes as long as a few, and no ray that is not among such texture coordinates needs thousands.
+const STRETCH: u32 = 8;
 
 impl<'a, Q: Quad> Signs<'a, Q> {
     #[inline(always)]
@@ -50,7 +53,7 @@ impl<'a, Q: Quad> Signs<'a, Q> {
             last: 0.0,
             nearest: None,
             done: false,
-            patience: MOST_SPANS,
+            patience: PATIENCE,
         }
     }
 
@@ -80,7 +83,12 @@ impl<'a, Q: Quad> Signs<'a, Q> {
     /// Counts a span; ends the search where there were too many.
     #[inline(always)]
     pub fn count_span(&mut self) {
-        self.patience = self.patience.saturating_sub(1);
+        self.count(1);
+    }
+
+    #[inline(always)]
+    fn count(&mut self, work: u32) {
+        self.patience = self.patience.saturating_sub(work);
         self.done |= self.patience == 0;
     }
 
@@ -138,6 +146,7 @@ impl<'a, Q: Quad> Signs<'a, Q> {
     /// `guess` is where a crossing would be.
     #[inline(always)]
     pub fn look_closely<L: Lanes<Quad = Q>>(&mut self, ends: [f64; 2], guess: f64) {
+        self.count(STRETCH);
         L::outline(Closely {
             signs: self,
             ends,
