@@ -10,7 +10,7 @@ mod common;
 use std::sync::Arc;
 
 use common::boulder;
-use common::rays::Rays;
+use common::rays::{Packets, Rays};
 use common::scene::{displaced, uniform};
 use common::timing::{RayTimes, option};
 use prismarch::embree::{EmbreeOptions, EmbreeTracer};
@@ -23,8 +23,11 @@ struct Contestant {
     simd: SimdLevel,
     tracer: EmbreeTracer,
     rays: Rays,
+    packets: Packets,
     /// By number of threads, as [`THREADS`].
     times: [RayTimes; THREADS.len()],
+    /// The same rays as packets.
+    packet_times: [RayTimes; THREADS.len()],
 }
 
 const THREADS: [usize; 2] = [1, 2];
@@ -68,13 +71,16 @@ fn main() {
             }]);
             let tracer = EmbreeTracer::new(&world, &EmbreeOptions::default())
                 .expect("Embree builds the sphere");
+            let rays = Rays::new(size, &tracer);
             contestants.push(Contestant {
                 march,
                 lod,
                 simd,
-                rays: Rays::new(size, &tracer),
+                packets: Packets::new(&rays),
+                rays,
                 tracer,
                 times: Default::default(),
+                packet_times: Default::default(),
             });
         }
     }
@@ -83,19 +89,27 @@ fn main() {
             for (times, threads) in contestant.times.iter_mut().zip(THREADS) {
                 times.round(&contestant.tracer, &contestant.rays, threads);
             }
+            for (times, threads) in contestant.packet_times.iter_mut().zip(THREADS) {
+                times.round_of_packets(&contestant.tracer, &contestant.packets, threads);
+            }
         }
     }
 
     println!("| march | kernel | threads | primary | bounce | occlusion |");
     println!("| --- | --- | --- | --- | --- | --- |");
     for contestant in &contestants {
-        for (times, threads) in contestant.times.iter().zip(THREADS) {
-            println!(
-                "| {} | {} | {threads} | {} |",
-                name(contestant.march, contestant.lod),
-                contestant.simd.name(),
-                times.cells(&contestant.rays),
-            );
+        let name = name(contestant.march, contestant.lod);
+        for (by, times) in [
+            ("", &contestant.times),
+            (", packets", &contestant.packet_times),
+        ] {
+            for (times, threads) in times.iter().zip(THREADS) {
+                println!(
+                    "| {name}{by} | {} | {threads} | {} |",
+                    contestant.simd.name(),
+                    times.cells(&contestant.rays),
+                );
+            }
         }
     }
 }

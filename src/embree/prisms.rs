@@ -2,7 +2,7 @@
 
 use super::HitTest;
 use crate::prism::{MovingPrisms, PrismHit, Prisms};
-use crate::ray::{Aabb, Ray};
+use crate::ray::{Aabb, Ray, RayPacket};
 use crate::surface::{ClosestPoint, PointQuery};
 
 impl HitTest for Prisms {
@@ -20,6 +20,19 @@ impl HitTest for Prisms {
 
     fn occluded(&self, prim: u32, ray: &Ray) -> bool {
         self.occluded(prim, ray)
+    }
+
+    fn intersect8(
+        &self,
+        prim: u32,
+        rays: &RayPacket,
+        valid: u8,
+    ) -> [Option<PrismHit>; RayPacket::LANES] {
+        self.intersect8(prim, rays, valid)
+    }
+
+    fn occluded8(&self, prim: u32, rays: &RayPacket, valid: u8) -> u8 {
+        self.occluded8(prim, rays, valid)
     }
 
     fn closest(&self, prim: u32, query: &PointQuery) -> Option<ClosestPoint> {

@@ -50,6 +50,14 @@ pub struct Corners<Q> {
     pub normals: [Q; 3],
 }
 
+/// Prisms in lanes: corners, normals and texture coordinates by corner and axis, and the range of w.
+pub struct PrismLanes<L> {
+    pub vertices: [[L; 3]; 3],
+    pub normals: [[L; 3]; 3],
+    pub texcoords: [[L; 2]; 3],
+    pub offsets: [L; 2],
+}
+
 impl Cluster {
     /// The prisms over these base triangles (one to eight); `offsets` gives the range of w of each.
     pub fn new(
@@ -201,6 +209,12 @@ impl Cluster {
         self.flagged(lane) >> WALLS & 0b111
     }
 
+    /// Whether any lane has a wall.
+    #[inline(always)]
+    pub fn has_walls(&self) -> bool {
+        (0..LANES).any(|lane| self.walls(lane) != 0)
+    }
+
     /// The range of w of a lane.
     #[inline(always)]
     pub fn offsets(&self, lane: usize) -> [f32; 2] {
@@ -211,18 +225,42 @@ impl Cluster {
         ]
     }
 
-    /// Corners by axis, in the order of `axes`; all lanes.
+    /// All prisms, with axes in the order of `axes`.
     #[inline(always)]
-    pub fn lanes<L: Lanes>(&self, axes: [usize; 3]) -> ([[L; 3]; 3], [[L; 3]; 3], [L; 2]) {
+    pub fn lanes<L: Lanes>(&self, axes: [usize; 3]) -> PrismLanes<L> {
         let ([v0, v1, v2], [n0, n1, n2]) = (&self.vertices, &self.normals);
-        (
-            [by_axes(v0, axes), by_axes(v1, axes), by_axes(v2, axes)],
-            [by_axes(n0, axes), by_axes(n1, axes), by_axes(n2, axes)],
-            [
+        let [s0, s1, s2] = &self.texcoords;
+        PrismLanes {
+            vertices: [by_axes(v0, axes), by_axes(v1, axes), by_axes(v2, axes)],
+            normals: [by_axes(n0, axes), by_axes(n1, axes), by_axes(n2, axes)],
+            texcoords: [by_rows(s0), by_rows(s1), by_rows(s2)],
+            offsets: [
                 L::from_bits(&self.offsets[0]),
                 L::from_bits(&self.offsets[1]),
             ],
-        )
+        }
+    }
+
+    /// One prism in all lanes.
+    #[inline(always)]
+    pub fn splat<L: Lanes>(&self, lane: usize, axes: [usize; 3]) -> PrismLanes<L> {
+        let ([v0, v1, v2], [n0, n1, n2]) = (&self.vertices, &self.normals);
+        let [s0, s1, s2] = &self.texcoords;
+        let [low, high] = self.offsets(lane);
+        PrismLanes {
+            vertices: [
+                of_lane(v0, axes, lane),
+                of_lane(v1, axes, lane),
+                of_lane(v2, axes, lane),
+            ],
+            normals: [
+                of_lane(n0, axes, lane),
+                of_lane(n1, axes, lane),
+                of_lane(n2, axes, lane),
+            ],
+            texcoords: [pair(s0, lane), pair(s1, lane), pair(s2, lane)],
+            offsets: [L::splat(low), L::splat(high)],
+        }
     }
 
     /// Whether t is monotone in w on all rays through a lane's prism.
@@ -271,17 +309,6 @@ impl Cluster {
         map.to_texel(DVec2::new(s[lane].into(), t[lane].into()))
     }
 
-    /// Texture coordinates of all lanes, by corner and axis.
-    #[inline(always)]
-    pub fn texcoord_lanes<L: Lanes>(&self) -> [[L; 2]; 3] {
-        let [s0, s1, s2] = &self.texcoords;
-        [
-            [L::from_array(s0[0]), L::from_array(s0[1])],
-            [L::from_array(s1[0]), L::from_array(s1[1])],
-            [L::from_array(s2[0]), L::from_array(s2[1])],
-        ]
-    }
-
     /// A depth along an axis that no prism is far from.
     #[inline(always)]
     pub fn anchor(&self, axis: usize) -> f32 {
@@ -325,6 +352,26 @@ fn by_axes<L: Lanes>(rows: &[[f32; LANES]; 3], [x, y, z]: [usize; 3]) -> [L; 3] 
         L::from_array(rows[y]),
         L::from_array(rows[z]),
     ]
+}
+
+#[inline(always)]
+fn by_rows<L: Lanes>([s, t]: &[[f32; LANES]; 2]) -> [L; 2] {
+    [L::from_array(*s), L::from_array(*t)]
+}
+
+/// One lane's numbers in all lanes.
+#[inline(always)]
+fn of_lane<L: Lanes>(rows: &[[f32; LANES]; 3], [x, y, z]: [usize; 3], lane: usize) -> [L; 3] {
+    [
+        L::splat(rows[x][lane]),
+        L::splat(rows[y][lane]),
+        L::splat(rows[z][lane]),
+    ]
+}
+
+#[inline(always)]
+fn pair<L: Lanes>([s, t]: &[[f32; LANES]; 2], lane: usize) -> [L; 2] {
+    [L::splat(s[lane]), L::splat(t[lane])]
 }
 
 /// Whether t is monotone in w on every ray through the prism: N'(b) . m(w) > 0, m the area normal of the triangle at w. It

@@ -87,20 +87,27 @@ impl<'a> Approach<'a> {
         })
     }
 
-    /// The arcs in the lanes `met`. Lanes are handed on as they are: moves of them are not free.
+    /// The prisms, as the ray sees them, and the lanes that it may meet.
+    #[inline(always)]
+    fn sight<L: Lanes>(&self) -> (Sight<L>, u32) {
+        let prisms = self.cluster.lanes::<L>(self.ray.axes);
+        let (sight, met) = Sight::new(&prisms, &self.ray.splat());
+        (sight, met & self.used)
+    }
+
+    /// Their arcs.
     #[inline(always)]
     fn cut<L: Lanes>(&self, sight: &Sight<L>) -> (CutArcs<L>, Units) {
-        let (_, normals, _) = self.cluster.lanes::<L>(self.ray.axes);
+        let prisms = self.cluster.lanes::<L>(self.ray.axes);
         let units = Units::new(&self.prisms.surface);
-        let texcoords = self.cluster.texcoord_lanes();
-        let cut = CutArcs::new(sight, texcoords, normals, &units, &self.ray);
+        let cut = CutArcs::new(sight, &prisms, &units, &self.ray.splat());
         (cut, units)
     }
 
     /// The arcs that are to be walked in the lanes `met`.
     #[inline(always)]
     fn meeting<'s, L: Lanes>(&'s self, cut: &CutArcs<L>, arcs: &'s Arcs, met: u32) -> Meeting<'s> {
-        let found = cut.found(arcs, met, &self.ray);
+        let found = cut.found(arcs, met, &self.ray.splat());
         // Level of detail is decided on curves of f64.
         let others = if self.ray.is_usual && self.prisms.spread() == 0.0 {
             found.others | met & self.cluster.folded::<L>()
@@ -187,8 +194,7 @@ impl Meeting<'_> {
 #[inline(always)]
 pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<PrismHit> {
     let approach = Approach::new(prisms, index, ray)?;
-    let (sight, met) = Sight::<L>::new(approach.cluster, &approach.ray);
-    let met = met & approach.used;
+    let (sight, met) = approach.sight::<L>();
     if met == 0 {
         return None;
     }
@@ -250,8 +256,7 @@ pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
     let Some(approach) = Approach::new(prisms, index, ray) else {
         return false;
     };
-    let (sight, met) = Sight::<L>::new(approach.cluster, &approach.ray);
-    let met = met & approach.used;
+    let (sight, met) = approach.sight::<L>();
     if met == 0 {
         return false;
     }

@@ -6,11 +6,16 @@
 //! only where the machine supports it.
 
 use super::simd::{Portable, SimdLevel};
-use super::{March, PrismHit, Prisms, exact, uniform};
-use crate::ray::Ray;
+use super::{March, PrismHit, Prisms, exact, packet, uniform};
+use crate::ray::{Ray, RayPacket, lanes_of};
 
 type Intersect = fn(&Prisms, u32, &Ray) -> Option<PrismHit>;
 type Occluded = fn(&Prisms, u32, &Ray) -> bool;
+
+/// Of a packet: hits, and the lanes that are to be asked one by one.
+type Intersect8 = fn(&Prisms, u32, &RayPacket, u8, &mut Hits) -> u8;
+type Occluded8 = fn(&Prisms, u32, &RayPacket, u8) -> [u8; 2];
+type Hits = [Option<PrismHit>; RayPacket::LANES];
 
 /// The chosen hit tests.
 #[derive(Clone, Copy)]
@@ -18,6 +23,48 @@ pub struct Kernel {
     level: SimdLevel,
     intersect: Intersect,
     occluded: Occluded,
+    /// Of marches that know packets.
+    packets: Option<(Intersect8, Occluded8)>,
+}
+
+/// The packet tests of the exact march.
+fn packets(level: SimdLevel) -> (Intersect8, Occluded8) {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn intersect_avx2(
+        prisms: &Prisms,
+        primitive: u32,
+        rays: &RayPacket,
+        valid: u8,
+        hits: &mut Hits,
+    ) -> u8 {
+        packet::intersect::<super::simd::Avx2>(prisms, primitive, rays, valid, hits)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn occluded_avx2(prisms: &Prisms, primitive: u32, rays: &RayPacket, valid: u8) -> [u8; 2] {
+        packet::occluded::<super::simd::Avx2>(prisms, primitive, rays, valid)
+    }
+
+    let portable: (Intersect8, Occluded8) =
+        (packet::intersect::<Portable>, packet::occluded::<Portable>);
+    match level {
+        SimdLevel::Baseline => portable,
+        #[cfg(target_arch = "x86_64")]
+        SimdLevel::Avx2 => (
+            // SAFETY: the machine supports AVX2 and FMA, or this function would not have been chosen.
+            |prisms, primitive, rays, valid, hits| unsafe {
+                intersect_avx2(prisms, primitive, rays, valid, hits)
+            },
+            // SAFETY: as above.
+            |prisms, primitive, rays, valid| unsafe {
+                occluded_avx2(prisms, primitive, rays, valid)
+            },
+        ),
+        #[cfg(not(target_arch = "x86_64"))]
+        SimdLevel::Avx2 => portable,
+    }
 }
 
 /// The hit tests of one march, for [`Portable`] lanes and for AVX2.
@@ -73,6 +120,7 @@ impl Kernel {
             level: SimdLevel::Baseline,
             intersect,
             occluded,
+            packets: None,
         }
     }
 
@@ -91,6 +139,7 @@ impl Kernel {
             level,
             intersect,
             occluded,
+            packets: (march == March::Exact).then(|| packets(level)),
         }
     }
 
@@ -106,5 +155,30 @@ impl Kernel {
     #[inline]
     pub fn occluded(&self, prisms: &Prisms, primitive: u32, ray: &Ray) -> bool {
         (self.occluded)(prisms, primitive, ray)
+    }
+
+    #[inline]
+    pub fn intersect8(&self, prisms: &Prisms, primitive: u32, rays: &RayPacket, valid: u8) -> Hits {
+        let mut hits = [None; RayPacket::LANES];
+        let alone = match self.packets {
+            Some((intersect, _)) => intersect(prisms, primitive, rays, valid, &mut hits),
+            None => valid,
+        };
+        for lane in lanes_of(alone) {
+            hits[lane] = self.intersect(prisms, primitive, &rays.ray(lane));
+        }
+        hits
+    }
+
+    #[inline]
+    pub fn occluded8(&self, prisms: &Prisms, primitive: u32, rays: &RayPacket, valid: u8) -> u8 {
+        let [mut hit, alone] = match self.packets {
+            Some((_, occluded)) => occluded(prisms, primitive, rays, valid),
+            None => [0, valid],
+        };
+        for lane in lanes_of(alone) {
+            hit |= u8::from(self.occluded(prisms, primitive, &rays.ray(lane))) << lane;
+        }
+        hit
     }
 }

@@ -18,6 +18,7 @@ mod frame;
 mod kernel;
 mod march;
 mod motion;
+mod packet;
 mod path;
 mod ray_frame;
 #[cfg(test)]
@@ -36,7 +37,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64};
 
 use glam::{DVec3, Vec3};
 
-use crate::ray::{Aabb, Ray};
+use crate::ray::{Aabb, Ray, RayPacket};
 use crate::surface::{ChartEdges, ClosestPoint, DisplacedSurface, PointQuery, Seams, SurfacePoint};
 use cluster::Cluster;
 use exact::ExactPrisms;
@@ -276,6 +277,24 @@ impl Prisms {
     #[inline]
     pub fn occluded(&self, primitive: u32, ray: &Ray) -> bool {
         self.kernel.occluded(self, primitive, ray)
+    }
+
+    /// [`intersect`](Self::intersect) for the lanes whose bits are set in `valid`: their rays must be valid. Rays that go
+    /// the same way are looked at side by side, faster than one by one. Other lanes get `None`.
+    #[inline]
+    pub fn intersect8(
+        &self,
+        primitive: u32,
+        rays: &RayPacket,
+        valid: u8,
+    ) -> [Option<PrismHit>; RayPacket::LANES] {
+        self.kernel.intersect8(self, primitive, rays, valid)
+    }
+
+    /// [`occluded`](Self::occluded) for the lanes whose bits are set in `valid`: bit i of the result tells of lane i.
+    #[inline]
+    pub fn occluded8(&self, primitive: u32, rays: &RayPacket, valid: u8) -> u8 {
+        self.kernel.occluded8(self, primitive, rays, valid)
     }
 
     /// [`DisplacedSurface::closest`] of what one traced primitive holds of the surface: its up to eight base triangles.

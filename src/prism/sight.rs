@@ -1,5 +1,5 @@
-//! Eight prisms of a cluster seen along one ray, in f32 lanes: which of them the ray may meet, and along which part of
-//! their ranges of w.
+//! Prisms seen along rays, in f32 lanes: eight of a cluster along one ray, or one along eight. Which of them the ray may
+//! meet, and along which part of their ranges of w.
 //!
 //! Seen along the ray a prism is the triangle with corners p_i(w) = a_i + w e_i for every w of its range, and the ray
 //! is the origin. Side i of that triangle has the area Q_i(w) = p_i+1(w) x p_i+2(w), a quadratic in w that its three
@@ -13,11 +13,11 @@
 //! less than 6u R^2. The slack is the sum. Depths are off by at most u (2d + W) at both ends of the range, and by 6u W more between
 //! them, where w is rounded.
 
-use super::cluster::Cluster;
-use super::ray_frame::Anchored;
+use super::cluster::PrismLanes;
+use super::ray_frame::{Beam, RayLanes};
 use super::simd::Lanes;
 
-/// A cluster as a ray sees it.
+/// Prisms as rays see them.
 pub struct Sight<L> {
     /// Smallest and largest w.
     pub offsets: [L; 2],
@@ -37,29 +37,105 @@ pub struct Sight<L> {
 }
 
 impl<L: Lanes> Sight<L> {
-    /// The cluster seen along a ray, and the lanes whose prisms the ray may meet.
+    /// The prisms seen along the rays, each lane's along its, and the lanes whose prism the ray may meet.
     #[inline(always)]
-    pub fn new(cluster: &Cluster, ray: &Anchored) -> (Self, u32) {
+    pub fn new(prisms: &PrismLanes<L>, ray: &RayLanes<L>) -> (Self, u32) {
+        let seen = Projection::new(prisms, ray);
+        let areas = seen.areas();
+        let met = seen.met(&areas, seen.off);
+        let Projection {
+            depths,
+            slopes,
+            off,
+            depth_off,
+            reach,
+            nearest,
+            farthest,
+            ..
+        } = seen;
+        let (t0, t1) = (nearest * ray.per_depth, farthest * ray.per_depth);
+        let slack = depth_off * ray.per_depth.abs() * L::splat(2.0);
+        let [tnear, tfar] = ray.interval;
+        let too_early = (t0.max(t1) + slack - tnear).sign_mask();
+        let too_late = (tfar - (t0.min(t1) - slack)).sign_mask();
+        let sight = Self {
+            offsets: prisms.offsets,
+            depths,
+            slopes,
+            areas,
+            off,
+            depth_off,
+            reach,
+            nearest,
+            farthest,
+        };
+        (sight, met & !too_early & !too_late)
+    }
+}
+
+/// The lanes whose prisms any ray of a beam may meet, and depths from the anchor between which these lie.
+#[inline(always)]
+pub fn met_by_beam<L: Lanes>(prisms: &PrismLanes<L>, beam: &Beam) -> (u32, [L; 2]) {
+    let seen = Projection::new(prisms, &beam.axis());
+    // Another ray sees a corner at depth z moved by d + z e, |d| and |e| at most the beam's spread. Then p x q changes by
+    // d x (q - p) where both are moved by as much, and by less than |p| |z' - z| |e| where not.
+    let deepest = seen.nearest.abs().max(seen.farthest.abs());
+    let [near_x, near_y] = [L::splat(beam.near_spread[0]), L::splat(beam.near_spread[1])];
+    let [turn_x, turn_y] = [
+        L::splat(beam.shear_spread[0]),
+        L::splat(beam.shear_spread[1]),
+    ];
+    let (moved_x, moved_y) = (
+        deepest.mul_add(turn_x, near_x),
+        deepest.mul_add(turn_y, near_y),
+    );
+    let farthest_off = seen.widest + moved_x.max(moved_y);
+    let turned = farthest_off * (seen.farthest - seen.nearest) * (turn_x + turn_y);
+    let slack = moved_x.mul_add(seen.extent(1), moved_y.mul_add(seen.extent(0), turned));
+    let off = seen.off + slack * L::splat(1.001);
+    let met = seen.met(&seen.areas(), off);
+    (met, [seen.nearest, seen.farthest])
+}
+
+/// Prisms projected along rays.
+struct Projection<L> {
+    /// Projected corners at both ends of the range of w.
+    at_low: [[L; 2]; 3],
+    at_high: [[L; 2]; 3],
+    depths: [L; 3],
+    slopes: [L; 3],
+    /// The largest projected coordinate.
+    widest: L,
+    off: L,
+    depth_off: L,
+    reach: L,
+    nearest: L,
+    farthest: L,
+}
+
+impl<L: Lanes> Projection<L> {
+    #[inline(always)]
+    fn new(prisms: &PrismLanes<L>, ray: &RayLanes<L>) -> Self {
         let zero = L::splat(0.0);
-        let (vertices, normals, offsets) = cluster.lanes::<L>(ray.axes);
-        let [low, high] = offsets;
-        // Projected corners at both ends of the range.
+        let PrismLanes {
+            vertices, normals, ..
+        } = prisms;
+        let [low, high] = prisms.offsets;
         let mut at_low = [[zero; 2]; 3];
         let mut at_high = [[zero; 2]; 3];
         let (mut depths, mut slopes) = ([zero; 3], [zero; 3]);
         let (mut widest, mut deepest) = (zero, zero);
         let (mut nearest, mut farthest) = (L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY));
         for k in 0..3 {
-            let depth = vertices[k][2] - L::splat(ray.depth);
+            let depth = vertices[k][2] - ray.depth;
             let slope = normals[k][2];
             deepest = deepest.max(depth.abs());
             let (d0, d1) = (low.mul_add(slope, depth), high.mul_add(slope, depth));
             nearest = nearest.min(d0.min(d1));
             farthest = farthest.max(d0.max(d1));
             for axis in 0..2 {
-                let shear = L::splat(ray.shear[axis]);
-                let from_anchor =
-                    vertices[k][axis] - L::splat(ray.near[axis]) - L::splat(ray.rest[axis]);
+                let shear = ray.shear[axis];
+                let from_anchor = vertices[k][axis] - ray.near[axis] - ray.rest[axis];
                 let a = depth.neg_mul_add(shear, from_anchor);
                 let e = slope.neg_mul_add(shear, normals[k][axis]);
                 let (p, q) = (low.mul_add(e, a), high.mul_add(e, a));
@@ -70,40 +146,54 @@ impl<L: Lanes> Sight<L> {
         }
         let reach = low.abs().max(high.abs());
         let unit = L::splat(f32::EPSILON);
-        let shear = L::splat(ray.shear[0].abs().max(ray.shear[1].abs()));
+        let shear = ray.shear[0].abs().max(ray.shear[1].abs());
         let lateral = shear.mul_add(deepest, widest) * L::splat(2.0);
         let coordinate = reach.mul_add(L::splat(1.25), lateral) * unit;
-        let depth_off = reach.mul_add(L::splat(3.5), deepest) * unit;
-        let off = widest * (coordinate * L::splat(4.5) + widest * unit * L::splat(3.0));
-        let areas = [
-            bernstein([at_low[1], at_low[2]], [at_high[1], at_high[2]]),
-            bernstein([at_low[2], at_low[0]], [at_high[2], at_high[0]]),
-            bernstein([at_low[0], at_low[1]], [at_high[0], at_high[1]]),
-        ];
+        Self {
+            at_low,
+            at_high,
+            depths,
+            slopes,
+            widest,
+            off: widest * (coordinate * L::splat(4.5) + widest * unit * L::splat(3.0)),
+            depth_off: reach.mul_add(L::splat(3.5), deepest) * unit,
+            reach,
+            nearest,
+            farthest,
+        }
+    }
+
+    #[inline(always)]
+    fn areas(&self) -> [[L; 3]; 3] {
+        let [l0, l1, l2] = self.at_low;
+        let [h0, h1, h2] = self.at_high;
+        [
+            bernstein([l1, l2], [h1, h2]),
+            bernstein([l2, l0], [h2, h0]),
+            bernstein([l0, l1], [h0, h1]),
+        ]
+    }
+
+    /// How far apart corners are along an axis, at most.
+    #[inline(always)]
+    fn extent(&self, axis: usize) -> L {
+        let [l0, l1, l2] = self.at_low;
+        let [h0, h1, h2] = self.at_high;
+        let (low, high) = (
+            [l0[axis], l1[axis], l2[axis]],
+            [h0[axis], h1[axis], h2[axis]],
+        );
+        most(low).max(most(high)) - least(low).min(least(high))
+    }
+
+    /// The lanes that are not surely missed, where areas are off by no more than `off`.
+    #[inline(always)]
+    fn met(&self, areas: &[[L; 3]; 3], off: L) -> u32 {
         let inside = most(areas[0]).min(most(areas[1])).min(most(areas[2]));
         let outside = least(areas[0]).max(least(areas[1])).max(least(areas[2]));
         let counter_clockwise = !(inside + off).sign_mask();
         let clockwise = !(off - outside).sign_mask();
-
-        let per_depth = L::splat(ray.per_depth);
-        let (t0, t1) = (nearest * per_depth, farthest * per_depth);
-        let slack = depth_off * per_depth.abs() * L::splat(2.0);
-        let [tnear, tfar] = ray.interval;
-        let too_early = (t0.max(t1) + slack - L::splat(tnear)).sign_mask();
-        let too_late = (L::splat(tfar) - (t0.min(t1) - slack)).sign_mask();
-        let met = (counter_clockwise | clockwise) & !too_early & !too_late;
-        let sight = Self {
-            offsets,
-            depths,
-            slopes,
-            areas,
-            off,
-            depth_off,
-            reach,
-            nearest,
-            farthest,
-        };
-        (sight, met)
+        counter_clockwise | clockwise
     }
 }
 

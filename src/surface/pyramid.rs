@@ -27,12 +27,15 @@ mod reduce;
 use axis::Axis;
 pub(crate) use entries::Entries;
 
+use std::sync::Arc;
+
 use super::{Texels, Wrap};
 
 /// The pyramid of one map, finest level first. Edits of the map keep it up to date.
 #[derive(Debug)]
 pub struct Pyramid {
     levels: Box<[Level]>,
+    rows: LevelRows,
     /// The finest level's sides.
     axes: [Axis; 2],
 }
@@ -43,7 +46,42 @@ pub struct Level {
     shift: u32,
     width: usize,
     height: usize,
-    entries: Entries,
+    /// Where the level's entries begin among those of all.
+    offset: usize,
+    entries: Arc<Entries>,
+}
+
+/// What lanes need of levels, by level. There are fewer than [`LevelRows::MOST`] levels over the longest side of a map; the last
+/// is repeated.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LevelRows {
+    /// Levels.
+    pub count: usize,
+    /// 1 / B.
+    pub per_block: [f32; Self::MOST],
+    /// The last block of a row, and the last row.
+    pub last: [[f32; Self::MOST]; 2],
+    pub width: [u32; Self::MOST],
+    pub offset: [u32; Self::MOST],
+}
+
+impl LevelRows {
+    pub const MOST: usize = 16;
+
+    fn new(levels: &[Level]) -> Self {
+        let of = |k: usize| &levels[k.min(levels.len() - 1)];
+        let row = |value: fn(&Level) -> f32| std::array::from_fn(|k| value(of(k)));
+        Self {
+            count: levels.len(),
+            per_block: row(|level| 1.0 / (1u32 << level.shift) as f32),
+            last: [
+                row(|level| (level.width - 1) as f32),
+                row(|level| (level.height - 1) as f32),
+            ],
+            width: std::array::from_fn(|k| of(k).width as u32),
+            offset: std::array::from_fn(|k| of(k).offset as u32),
+        }
+    }
 }
 
 impl Level {
@@ -73,7 +111,7 @@ impl Level {
         self.entries.get(self.index(i, j))
     }
 
-    /// The pairs as stored, row by row.
+    /// The pairs of all levels as stored, level by level and row by row.
     pub(crate) fn entries(&self) -> &Entries {
         &self.entries
     }
@@ -81,7 +119,12 @@ impl Level {
     #[inline]
     fn index(&self, i: usize, j: usize) -> usize {
         assert!(i < self.width && j < self.height, "block outside the map");
-        j * self.width + i
+        self.offset + j * self.width + i
+    }
+
+    /// Where the level's pairs begin among these.
+    pub(crate) fn offset(&self) -> usize {
+        self.offset
     }
 }
 
@@ -99,6 +142,7 @@ impl Pyramid {
             Texels::F32(t) => build::levels(t, axes),
         };
         Self {
+            rows: LevelRows::new(&levels),
             levels: levels.into_boxed_slice(),
             axes,
         }
@@ -109,6 +153,11 @@ impl Pyramid {
         &self.levels
     }
 
+    /// The same for lanes.
+    pub(crate) fn rows(&self) -> &LevelRows {
+        &self.rows
+    }
+
     /// Smallest and largest texel of the whole map, as stored.
     pub fn range(&self) -> (f32, f32) {
         self.levels[self.levels.len() - 1].get(0, 0)
@@ -116,7 +165,7 @@ impl Pyramid {
 
     /// Bytes held by the entries.
     pub fn bytes(&self) -> usize {
-        self.levels.iter().map(|level| level.entries.bytes()).sum()
+        self.levels[0].entries.bytes()
     }
 
     /// Brings the entries up to date after texels of columns `x.0..=x.1` and rows `y.0..=y.1` have changed. `row`

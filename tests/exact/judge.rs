@@ -10,11 +10,12 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use prismarch::prism::{PrismHit, Prisms, SimdLevel};
-use prismarch::ray::{Aabb, Ray};
+use prismarch::ray::{Aabb, Ray, RayPacket};
 use prismarch::surface::DisplacedSurface;
 use prismarch::trace::{Hit, INVALID_ID, Tracer};
 
 use super::common::march;
+use super::common::numbers::Numbers;
 use super::oracle::{Crossing, Crossings, EDGE, Line, Oracle};
 
 /// Part of the size that single precision resolves: of numbers a few sizes large, a few roundings deep.
@@ -231,6 +232,13 @@ fn engines(surface: &Arc<DisplacedSurface>) -> Vec<(&'static str, Box<dyn Tracer
     let mut engines: Vec<(&str, Box<dyn Tracer>)> = Vec::new();
     for level in [SimdLevel::Baseline, SimdLevel::Avx2] {
         if let Some(prisms) = prisms().with_simd(level) {
+            let name = match level {
+                SimdLevel::Baseline => "baseline, packets",
+                SimdLevel::Avx2 => "avx2+fma, packets",
+            };
+            engines.push((name, Box::new(Bundled(Loop::new(prisms)))));
+        }
+        if let Some(prisms) = prisms().with_simd(level) {
             engines.push((level.name(), Box::new(Loop::new(prisms))));
         }
     }
@@ -252,6 +260,76 @@ fn engines(surface: &Arc<DisplacedSurface>) -> Vec<(&'static str, Box<dyn Tracer
         engines.push(("embree", Box::new(tracer)));
     }
     engines
+}
+
+/// Every ray in a packet with seven others that go nearly the same way.
+struct Bundled(Loop);
+
+impl Bundled {
+    /// The packet, and the lane of the ray.
+    fn packet(ray: &Ray) -> (RayPacket, usize) {
+        let mut numbers = Numbers::new(u64::from(ray.direction.x.to_bits()));
+        let lane = numbers.below(RayPacket::LANES);
+        // From as close as to be in one cell of the map to as far as to be in other prisms.
+        let spread = 10f32.powf(numbers.between(-5.0, -1.0));
+        let mut packet = RayPacket::EMPTY;
+        for k in 0..RayPacket::LANES {
+            let moved = spread * ray.direction.length() * numbers.direction();
+            let near = Ray {
+                direction: ray.direction + moved,
+                tfar: ray.tfar * numbers.between(0.9, 1.1),
+                ..*ray
+            };
+            packet.set(k, if k == lane { ray } else { &near });
+        }
+        (packet, lane)
+    }
+}
+
+impl Tracer for Bundled {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let (packet, lane) = Self::packet(ray);
+        let valid = packet.valid();
+        let hits = self
+            .0
+            .candidates(ray)
+            .filter_map(|p| self.0.prisms.intersect8(p, &packet, valid)[lane]);
+        nearest(hits)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        let (packet, lane) = Self::packet(ray);
+        let valid = packet.valid();
+        self.0
+            .candidates(ray)
+            .any(|p| self.0.prisms.occluded8(p, &packet, valid) >> lane & 1 != 0)
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.0.bounds()
+    }
+
+    fn bvh_bytes(&self) -> usize {
+        0
+    }
+
+    fn name(&self) -> String {
+        "loop over packets".into()
+    }
+}
+
+/// The nearest of some hits, as a tracer tells of it.
+fn nearest(hits: impl Iterator<Item = PrismHit>) -> Option<Hit> {
+    let PrismHit { prim, t, u, v, ng } = hits.min_by(|a, b| a.t.total_cmp(&b.t))?;
+    Some(Hit {
+        t,
+        u,
+        v,
+        prim,
+        geom: 0,
+        inst: [INVALID_ID],
+        ng,
+    })
 }
 
 /// A loop over all prisms whose bounds the ray meets.
@@ -281,17 +359,7 @@ impl Tracer for Loop {
         let hits = self
             .candidates(ray)
             .filter_map(|p| self.prisms.intersect(p, ray));
-        let first = hits.min_by(|a, b| a.t.total_cmp(&b.t))?;
-        let PrismHit { prim, t, u, v, ng } = first;
-        Some(Hit {
-            t,
-            u,
-            v,
-            prim,
-            geom: 0,
-            inst: [INVALID_ID],
-            ng,
-        })
+        nearest(hits)
     }
 
     fn occluded(&self, ray: &Ray) -> bool {

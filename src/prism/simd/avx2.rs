@@ -125,6 +125,17 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn choose(bits: u32, a: Self, b: Self) -> Self {
+        // SAFETY: AVX2 is there wherever an `Avx2` is.
+        unsafe {
+            let of_lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), of_lane);
+            let set = _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, of_lane));
+            Self(_mm256_blendv_ps(b.0, a.0, set))
+        }
+    }
+
+    #[inline(always)]
     fn next_of(self, rest: Self) -> Self {
         // SAFETY: AVX2 is there wherever an `Avx2` is.
         unsafe {
@@ -167,26 +178,38 @@ impl Lanes for Avx2 {
         let last = [(level.width() - 1) as f32, (level.height() - 1) as f32];
         let i = i.max(Self::splat(0.0)).min(Self::splat(last[0]));
         let j = j.max(Self::splat(0.0)).min(Self::splat(last[1]));
-        // SAFETY: AVX2 is there. 0 <= i < width and 0 <= j < height, so index is that of a stored pair; the 32-bit loads of
-        // 16-bit pairs end inside the pairs that `Entries` keeps after the last one. Edits meanwhile: as in `cell_corners`.
+        // SAFETY: AVX2 is there. 0 <= i < width and 0 <= j < height, so index is that of a stored pair of the level.
         unsafe {
             let stride = _mm256_set1_epi32(level.width() as i32);
             let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
             let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
-            let (low, high) = match level.entries() {
-                Entries::U8(e) => pair::<8>(_mm256_i32gather_epi32::<2>(e.as_ptr().cast(), index)),
-                Entries::U16(e) => {
-                    pair::<16>(_mm256_i32gather_epi32::<4>(e.as_ptr().cast(), index))
-                }
-                Entries::F32(e) => {
-                    let low = e.as_ptr().cast::<f32>();
-                    (
-                        Self(_mm256_i32gather_ps::<8>(low, index)),
-                        Self(_mm256_i32gather_ps::<8>(low.add(1), index)),
-                    )
-                }
-            };
-            [low, high]
+            let offset = _mm256_set1_epi32(level.offset() as i32);
+            entries(level.entries(), _mm256_add_epi32(index, offset))
+        }
+    }
+
+    #[inline(always)]
+    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: Self, y: Self) -> [Self; 2] {
+        let rows = grid.rows;
+        // SAFETY: AVX2 is there. The level is one of the pyramid's, and the block is moved inside it, so index is that of a
+        // stored pair: rows beyond the last level repeat it, and `max` gives 0 for NaN.
+        unsafe {
+            // The exponent of `size`, 1 for sizes from 2 to 4: the level is one less.
+            let zero = _mm256_setzero_si256();
+            let exponent = _mm256_srli_epi32::<23>(_mm256_castps_si256(size.abs().0));
+            let level = _mm256_sub_epi32(exponent, _mm256_set1_epi32(128));
+            let last = _mm256_set1_epi32(rows.count as i32 - 1);
+            let level = _mm256_min_epi32(_mm256_max_epi32(level, zero), last);
+            let per_block = Self(looked_up(rows.per_block.as_ptr().cast(), level));
+            let last_i = Self(looked_up(rows.last[0].as_ptr().cast(), level));
+            let last_j = Self(looked_up(rows.last[1].as_ptr().cast(), level));
+            let i = (x * per_block).max(Self::splat(0.0)).min(last_i);
+            let j = (y * per_block).max(Self::splat(0.0)).min(last_j);
+            let width = _mm256_castps_si256(looked_up(rows.width.as_ptr().cast(), level));
+            let offset = _mm256_castps_si256(looked_up(rows.offset.as_ptr().cast(), level));
+            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), width);
+            let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
+            entries(grid.levels[0].entries(), _mm256_add_epi32(index, offset))
         }
     }
 
@@ -233,6 +256,47 @@ impl Lanes for Avx2 {
                 }
             }
         }
+    }
+}
+
+/// Entries of a table of sixteen words, by numbers from 0 to 15.
+///
+/// # Safety
+///
+/// Needs AVX2, and sixteen words at `table`.
+#[inline(always)]
+unsafe fn looked_up(table: *const f32, index: __m256i) -> __m256 {
+    // SAFETY: the caller's.
+    unsafe {
+        let low = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table), index);
+        let high = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.add(8)), index);
+        let is_high = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(index));
+        _mm256_blendv_ps(low, high, is_high)
+    }
+}
+
+/// The smallest and largest of stored pairs.
+///
+/// # Safety
+///
+/// Needs AVX2, and numbers of stored pairs.
+#[inline(always)]
+unsafe fn entries(entries: &Entries, index: __m256i) -> [Avx2; 2] {
+    // SAFETY: the caller's; the 32-bit loads of 16-bit pairs end inside the pairs that `Entries` keeps after the last one. Edits
+    // meanwhile: as in `cell_corners`.
+    unsafe {
+        let (low, high) = match entries {
+            Entries::U8(e) => pair::<8>(_mm256_i32gather_epi32::<2>(e.as_ptr().cast(), index)),
+            Entries::U16(e) => pair::<16>(_mm256_i32gather_epi32::<4>(e.as_ptr().cast(), index)),
+            Entries::F32(e) => {
+                let low = e.as_ptr().cast::<f32>();
+                (
+                    Avx2(_mm256_i32gather_ps::<8>(low, index)),
+                    Avx2(_mm256_i32gather_ps::<8>(low.add(1), index)),
+                )
+            }
+        };
+        [low, high]
     }
 }
 

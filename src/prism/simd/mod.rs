@@ -16,7 +16,7 @@ mod avx2_quad;
 use std::ops::{Add, Div, Mul, Sub};
 use std::sync::atomic::AtomicU32;
 
-use crate::surface::{DisplacementMap, Level, StoredTexels, Wrap};
+use crate::surface::{DisplacementMap, Level, LevelRows, StoredTexels, Wrap};
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -102,6 +102,8 @@ pub(crate) trait Lanes:
     fn abs(self) -> Self;
     /// `a` where the sign bit of `self` is set, `b` elsewhere.
     fn select_negative(self, a: Self, b: Self) -> Self;
+    /// Lane k of `a` where bit k is set, of `b` elsewhere.
+    fn choose(bits: u32, a: Self, b: Self) -> Self;
     /// Lane k becomes lane k + 1; the last stays.
     fn next(self) -> Self;
     /// Lane k becomes lane k + 1; the last is the first of `rest`.
@@ -113,6 +115,9 @@ pub(crate) trait Lanes:
     /// Smallest and largest stored texel of the blocks (i, j) of a level, integers in float lanes. Blocks outside the
     /// level, and NaN, are moved inside first.
     fn block_ranges(level: &Level, i: Self, j: Self) -> [Self; 2];
+    /// The same around boxes whose lower left corners are at (x, y), each on the finest level whose blocks are larger than `size`. Sizes
+    /// and corners are from 0 to 2^24; others are moved there.
+    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: Self, y: Self) -> [Self; 2];
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), integers in float lanes.
     /// Cells outside the grid, and NaN, are moved inside first.
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4];
@@ -130,6 +135,7 @@ pub(crate) struct Grid<'m> {
     /// Texels across and up.
     size: [f32; 2],
     levels: &'m [Level],
+    rows: &'m LevelRows,
 }
 
 impl<'m> Grid<'m> {
@@ -142,6 +148,7 @@ impl<'m> Grid<'m> {
             wrap: map.wrap(),
             size: [width as f32, height as f32],
             levels: map.pyramid().levels(),
+            rows: map.pyramid().rows(),
         }
     }
 
@@ -186,6 +193,14 @@ impl<'m> Grid<'m> {
         let i = (self.first(x, self.size[0]) * per_block).floor();
         let j = (self.first(y, self.size[1]) * per_block).floor();
         L::block_ranges(level, i, j)
+    }
+
+    /// The same where every lane has its own size of box.
+    #[inline(always)]
+    pub fn block_ranges<L: Lanes>(&self, size: L, x: [L; 2], y: [L; 2]) -> [L; 2] {
+        let x = self.first(x, self.size[0]);
+        let y = self.first(y, self.size[1]);
+        L::block_ranges_by_size(self, size, x, y)
     }
 
     /// The smallest folded coordinate of a box, or one in the same block.
@@ -348,6 +363,32 @@ mod tests {
         }
     }
 
+    fn finds_every_lanes_level<L: Lanes>() {
+        for map in maps() {
+            let grid = Grid::new(&map);
+            for k in 0..60 {
+                let lane = |l: usize, by: f32| (k * 8 + l as i32 - 240) as f32 * by;
+                let x: [f32; LANES] = std::array::from_fn(|l| lane(l, 0.113));
+                let y: [f32; LANES] = std::array::from_fn(|l| lane(7 - l, 0.071));
+                let size: [f32; LANES] = std::array::from_fn(|l| 0.37 * 1.9f32.powi(l as i32));
+                let right = std::array::from_fn(|l| x[l] + size[l]);
+                let top = std::array::from_fn(|l| y[l] + size[l]);
+                let [x, y] = [[x, right], [y, top]].map(|box_| box_.map(L::from_array));
+                let found = grid.block_ranges(L::from_array(size), x, y);
+                let found = found.map(L::to_array);
+                for l in 0..LANES {
+                    let level = grid.level(size[l]);
+                    let one = grid.block_range(level, x, y).map(L::to_array);
+                    assert_eq!(
+                        [found[0][l], found[1][l]],
+                        [one[0][l], one[1][l]],
+                        "{level}"
+                    );
+                }
+            }
+        }
+    }
+
     fn survives_any_coordinate<L: Lanes>() {
         for map in maps() {
             let grid = Grid::new(&map);
@@ -363,7 +404,10 @@ mod tests {
             ];
             for shift in 0..LANES {
                 let y = std::array::from_fn(|l| odd[(l + shift) % LANES]);
-                grid.sample(L::from_array(odd), L::from_array(y));
+                let (x, y) = (L::from_array(odd), L::from_array(y));
+                grid.sample(x, y);
+                grid.block_ranges(x, [x, x], [y, y]);
+                grid.block_ranges(y, [x, x], [y, y]);
             }
         }
     }
@@ -387,6 +431,8 @@ mod tests {
         assert_eq!(x.abs().to_array(), x.to_array().map(f32::abs));
         let chosen = x.select_negative(L::splat(0.0), x);
         assert_eq!(chosen.to_array(), x.to_array().map(|x| x.max(0.0)));
+        let chosen = L::choose(0b0100_1001, two, x).to_array();
+        assert_eq!(chosen, [2.0, -2.0, 3.0, 2.0, -5.0, 6.0, 2.0, 8.0]);
         let bits = x.to_array().map(|x| AtomicU32::new(x.to_bits()));
         assert_eq!(L::from_bits(&bits).to_array(), x.to_array());
     }
@@ -395,6 +441,7 @@ mod tests {
     fn baseline_samples_the_map() {
         moves_lanes::<Portable>();
         samples_like_the_map::<Portable>();
+        finds_every_lanes_level::<Portable>();
         survives_any_coordinate::<Portable>();
     }
 
@@ -404,6 +451,7 @@ mod tests {
         if SimdLevel::Avx2.is_supported() {
             moves_lanes::<Avx2>();
             samples_like_the_map::<Avx2>();
+            finds_every_lanes_level::<Avx2>();
             survives_any_coordinate::<Avx2>();
         }
     }

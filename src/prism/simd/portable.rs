@@ -3,7 +3,7 @@
 use std::ops::{Add, Div, Mul, Sub};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use glam::Vec4;
+use glam::{BVec4A, Vec4};
 
 use super::{Grid, LANES, Lanes, Task};
 use crate::prism::steps;
@@ -105,6 +105,15 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     }
 
     #[inline(always)]
+    fn choose(bits: u32, a: Self, b: Self) -> Self {
+        let four = |bits: u32, a, b| {
+            let set = |lane: u32| bits >> lane & 1 != 0;
+            Vec4::select(BVec4A::new(set(0), set(1), set(2), set(3)), a, b)
+        };
+        Self(four(bits, a.0, b.0), four(bits >> 4, a.1, b.1))
+    }
+
+    #[inline(always)]
     fn next_of(self, rest: Self) -> Self {
         let moved = self.next();
         Self(moved.0, moved.1.with_w(rest.0.x))
@@ -137,6 +146,22 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
             // `as usize` turns NaN and negatives into 0.
             let i = (i[l] as usize).min(level.width() - 1);
             let j = (j[l] as usize).min(level.height() - 1);
+            (low[l], high[l]) = level.get(i, j);
+        }
+        [Self::from_array(low), Self::from_array(high)]
+    }
+
+    #[inline(always)]
+    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: Self, y: Self) -> [Self; 2] {
+        if COUNTED {
+            steps::count();
+        }
+        let (size, x, y) = (size.to_array(), x.to_array(), y.to_array());
+        let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            let level = &grid.levels[grid.level(size[l])];
+            let i = (x[l] as usize >> level.shift()).min(level.width() - 1);
+            let j = (y[l] as usize >> level.shift()).min(level.height() - 1);
             (low[l], high[l]) = level.get(i, j);
         }
         [Self::from_array(low), Self::from_array(high)]

@@ -1,6 +1,7 @@
 //! A whole pyramid from the texels, on all cores.
 
 use std::num::NonZero;
+use std::sync::Arc;
 use std::thread;
 
 use super::axis::Axis;
@@ -13,25 +14,34 @@ const PARALLEL: usize = (256 / reduce::SIDE) * (256 / reduce::SIDE);
 /// The levels over texels of sides `x` and `y`, whose shifts are those of the finest level. On how many threads
 /// they are made changes nothing in them.
 pub fn levels<T: Pack>(texels: &[T], axes: [Axis; 2]) -> Vec<Level> {
-    let mut axes = axes;
-    let mut last = finest(texels, axes);
-    let mut levels = Vec::new();
-    while axes.map(Axis::blocks) != [1, 1] {
-        let next = coarser::<T>(&last, axes);
-        levels.push(level::<T>(last, axes));
-        (last, axes) = (next, axes.map(Axis::coarser));
+    let mut shapes = vec![axes];
+    let mut last = axes;
+    while last.map(Axis::blocks) != [1, 1] {
+        last = last.map(Axis::coarser);
+        shapes.push(last);
     }
-    levels.push(level::<T>(last, axes));
-    levels
-}
-
-fn level<T: Pack>(packed: Vec<T::Packed>, [x, y]: [Axis; 2]) -> Level {
-    Level {
+    let size = |[x, y]: &[Axis; 2]| x.blocks() * y.blocks();
+    let mut entries = Vec::with_capacity(shapes.iter().map(size).sum::<usize>() + Entries::TAIL);
+    entries.extend(finest(texels, axes));
+    let mut offsets = vec![0];
+    for (axes, finer) in shapes[1..].iter().zip(&shapes) {
+        let offset = entries.len();
+        let next = coarser::<T>(&entries[offset - size(finer)..], *finer);
+        debug_assert_eq!(next.len(), size(axes));
+        entries.extend(next);
+        offsets.push(offset);
+    }
+    entries.resize(entries.len() + Entries::TAIL, T::Packed::default());
+    let entries = Arc::new(T::entries(entries));
+    let levels = shapes.iter().zip(offsets);
+    let level = |([x, y], offset): (&[Axis; 2], usize)| Level {
         shift: x.shift,
         width: x.blocks(),
         height: y.blocks(),
-        entries: T::entries(packed),
-    }
+        offset,
+        entries: entries.clone(),
+    };
+    levels.map(level).collect()
 }
 
 fn finest<T: Pack>(texels: &[T], [x, y]: [Axis; 2]) -> Vec<T::Packed> {
@@ -63,27 +73,26 @@ fn coarser<T: Pack>(finer: &[T::Packed], axes: [Axis; 2]) -> Vec<T::Packed> {
     })
 }
 
-/// The entries of a level and its tail; `fill` is given a first row and a slice of whole rows, in parallel.
+/// The entries of a level; `fill` is given a first row and a slice of whole rows, in parallel.
 fn in_bands<E: Copy + Default + Send>(
     [x, y]: [Axis; 2],
     fill: impl Fn(usize, &mut [E]) + Sync,
 ) -> Vec<E> {
     let (width, height) = (x.blocks(), y.blocks());
     let count = width * height;
-    let mut entries = Vec::with_capacity(count + Entries::TAIL);
-    entries.resize(count + Entries::TAIL, E::default());
+    let mut entries = vec![E::default(); count];
     let threads = if count < PARALLEL {
         1
     } else {
         thread::available_parallelism().map_or(1, NonZero::get)
     };
     if threads == 1 {
-        fill(0, &mut entries[..count]);
+        fill(0, &mut entries);
         return entries;
     }
     let rows = height.div_ceil(threads);
     thread::scope(|scope| {
-        let bands = entries[..count].chunks_mut(rows * width);
+        let bands = entries.chunks_mut(rows * width);
         for (k, band) in bands.enumerate() {
             let fill = &fill;
             scope.spawn(move || fill(k * rows, band));

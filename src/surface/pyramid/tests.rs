@@ -166,7 +166,7 @@ fn pairs_are_stored_as_kernels_expect_them() {
     use std::sync::atomic::Ordering::Relaxed;
     let entries = |texels| {
         let map = DisplacementMap::new(2, 1, texels, Wrap::Repeat).unwrap();
-        match &map.pyramid().levels()[0].entries {
+        match map.pyramid().levels()[0].entries() {
             Entries::U8(e) => e.iter().map(|e| e.load(Relaxed).into()).collect(),
             Entries::U16(e) | Entries::F32(e) => {
                 e.iter().map(|e| e.load(Relaxed)).collect::<Vec<u32>>()

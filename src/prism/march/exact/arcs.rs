@@ -8,8 +8,9 @@
 mod bounds;
 
 use super::Problem;
+use crate::prism::cluster::PrismLanes;
 use crate::prism::curve::{Curve, View};
-use crate::prism::ray_frame::Anchored;
+use crate::prism::ray_frame::RayLanes;
 use crate::prism::sight::Sight;
 use crate::prism::simd::{LANES, Lanes, Quad};
 use crate::surface::DisplacedSurface;
@@ -63,6 +64,40 @@ pub struct Arcs {
     pub height_rounding: Row,
 }
 
+/// Where arcs go: coefficients of [`Arcs`] in lanes.
+pub struct Places<L> {
+    x: [L; 3],
+    y: [L; 3],
+    u: [L; 3],
+    v: [L; 3],
+    area: [L; 3],
+    height: [L; 2],
+    spread: [L; 3],
+}
+
+impl<L: Lanes> Places<L> {
+    /// Texel coordinates and the height in stored texel units, from what these are at the arcs' points of reference.
+    #[inline(always)]
+    pub fn at(&self, s: L, [x, y, h]: [L; 3]) -> [L; 3] {
+        let one = L::splat(1.0);
+        let inverse = one / quadratic(self.area, s);
+        let u = quadratic(self.u, s) * inverse;
+        let v = quadratic(self.v, s) * inverse;
+        // |N'|^2 = 1 - sum b_i b_j spread_ij.
+        let b0 = one - u - v;
+        let [k01, k02, k12] = self.spread;
+        let short = (b0 * v).mul_add(k02, u * v * k12);
+        let short = (b0 * u).mul_add(k01, short);
+        let length = (one - short).max(L::splat(0.0)).sqrt();
+        let w = s.mul_add(self.height[1], self.height[0]);
+        [
+            quadratic(self.x, s).mul_add(inverse, x),
+            quadratic(self.y, s).mul_add(inverse, y),
+            w.mul_add(length, h),
+        ]
+    }
+}
+
 /// What is needed of a surface to make arcs.
 pub struct Units {
     /// Texels per texture coordinate.
@@ -107,15 +142,9 @@ pub struct Cut<L> {
 }
 
 impl<L: Lanes> Cut<L> {
-    /// The arcs of a cluster.
+    /// The arcs of prisms that are [seen](Sight) so.
     #[inline(always)]
-    pub fn new(
-        sight: &Sight<L>,
-        texcoords: [[L; 2]; 3],
-        normals: [[L; 3]; 3],
-        units: &Units,
-        ray: &Anchored,
-    ) -> Self {
+    pub fn new(sight: &Sight<L>, prisms: &PrismLanes<L>, units: &Units, ray: &RayLanes<L>) -> Self {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let off = sight.off;
         // Twice the area of the offset triangle: positive from here on.
@@ -147,7 +176,7 @@ impl<L: Lanes> Cut<L> {
         let empty = (to - from).sign_mask();
 
         // In the order of t: see `Curve`.
-        let per_depth = L::splat(ray.per_depth);
+        let per_depth = ray.per_depth;
         let turned = flip.select_negative(zero - per_depth, per_depth);
         let (a, b) = (
             turned.select_negative(to, from),
@@ -163,7 +192,7 @@ impl<L: Lanes> Cut<L> {
         ];
         let area = sum(q);
 
-        let [s0, s1, s2] = texcoords;
+        let [s0, s1, s2] = prisms.texcoords;
         let (width, height) = (L::splat(units.texels[0]), L::splat(units.texels[1]));
         let (x1, x2) = ((s1[0] - s0[0]) * width, (s2[0] - s0[0]) * width);
         let (y1, y2) = ((s1[1] - s0[1]) * height, (s2[1] - s0[1]) * height);
@@ -175,7 +204,7 @@ impl<L: Lanes> Cut<L> {
             dw.mul_add(slopes[1], w0.mul_add(slopes[2], depths[2])) * per_depth,
             dw * slopes[2] * per_depth,
         ];
-        let [n0, n1, n2] = normals;
+        let [n0, n1, n2] = prisms.normals;
         let per_world = L::splat(units.per_world);
         let arcs = Lanewise {
             x: blend(&q, x1, x2),
@@ -215,11 +244,11 @@ impl<L: Lanes> Cut<L> {
 
     /// What is to be walked of the lanes `met` of `arcs`, which are this.
     #[inline(always)]
-    pub fn found(&self, arcs: &Arcs, met: u32, ray: &Anchored) -> Found {
+    pub fn found(&self, arcs: &Arcs, met: u32, ray: &RayLanes<L>) -> Found {
         let (begins, ends) = (L::from_array(arcs.ends[0]), L::from_array(arcs.ends[1]));
         let time_off = L::from_array(arcs.time_off);
-        let too_early = (ends + time_off - L::splat(ray.interval[0])).sign_mask();
-        let too_late = (L::splat(ray.interval[1]) - (begins - time_off)).sign_mask();
+        let too_early = (ends + time_off - ray.interval[0]).sign_mask();
+        let too_late = (ray.interval[1] - (begins - time_off)).sign_mask();
         // What is no number is not good enough either, nor what was divided by an A below 0.
         let rounding = L::from_array(arcs.rounding).min(L::splat(f32::MAX));
         let coarse = (L::splat(FINE) - rounding).sign_mask() | rounding.sign_mask();
@@ -234,6 +263,34 @@ impl<L: Lanes> Cut<L> {
 }
 
 impl Arcs {
+    /// All arcs, each in its lane.
+    #[inline(always)]
+    pub fn places<L: Lanes>(&self) -> Places<L> {
+        self.places_in::<L, true>(0)
+    }
+
+    /// One arc in all lanes.
+    #[inline(always)]
+    pub fn places_of<L: Lanes>(&self, lane: usize) -> Places<L> {
+        self.places_in::<L, false>(lane)
+    }
+
+    #[inline(always)]
+    fn places_in<L: Lanes, const ALL: bool>(&self, lane: usize) -> Places<L> {
+        Places {
+            x: three::<L, ALL>(&self.x, lane),
+            y: three::<L, ALL>(&self.y, lane),
+            u: three::<L, ALL>(&self.u, lane),
+            v: three::<L, ALL>(&self.v, lane),
+            area: three::<L, ALL>(&self.area, lane),
+            height: [
+                one::<L, ALL>(&self.height[0], lane),
+                one::<L, ALL>(&self.height[1], lane),
+            ],
+            spread: three::<L, ALL>(&self.spread, lane),
+        }
+    }
+
     /// The arc that is all of a curve, in every lane. Texel coordinates are from the curve's base, ray parameters from `start`.
     #[inline(always)]
     pub fn of_curve<L: Lanes>(
@@ -292,6 +349,31 @@ impl Arcs {
             },
         )
     }
+}
+
+/// A row as it is, or one number of it in all lanes.
+#[inline(always)]
+fn one<L: Lanes, const ALL: bool>(row: &Row, lane: usize) -> L {
+    if ALL {
+        L::from_array(*row)
+    } else {
+        L::splat(row[lane])
+    }
+}
+
+#[inline(always)]
+fn three<L: Lanes, const ALL: bool>([a, b, c]: &Rows3, lane: usize) -> [L; 3] {
+    [
+        one::<L, ALL>(a, lane),
+        one::<L, ALL>(b, lane),
+        one::<L, ALL>(c, lane),
+    ]
+}
+
+/// c0 + c1 s + c2 s^2.
+#[inline(always)]
+fn quadratic<L: Lanes>([c0, c1, c2]: [L; 3], s: L) -> L {
+    s.mul_add(s.mul_add(c2, c1), c0)
 }
 
 /// With the other sign where the sign bit of `flip` is set.

@@ -127,21 +127,15 @@ impl Chord {
             let length = (leaves.min(one) - start).max(zero);
 
             let (column, row) = (i + L::splat(i0 + base[0]), j + L::splat(j0 + base[1]));
-            let [h00, h10, h01, h11] = if held {
+            let corners = if held {
                 L::cell_corners(grid, column, row)
             } else {
                 grid.corners(column, row)
             };
-            let (bottom, left) = (h10 - h00, h01 - h00);
-            let twist = (h11 - h01) - bottom;
             let (fx, fy) = (x - i, y - j);
-            let slope_x = twist.mul_add(fy, bottom);
-            let slope_y = twist.mul_add(fx, left);
-            let surface = fy.mul_add(left, fx.mul_add(slope_x, h00));
-            let f0 = start.mul_add(L::splat(dh), L::splat(h0)) - surface;
             let (mx, my) = (length * L::splat(dx), length * L::splat(dy));
-            let f1 = slope_y.neg_mul_add(my, slope_x.neg_mul_add(mx, length * L::splat(dh)));
-            let f2 = (twist * mx).neg_mul_add(my, zero);
+            let h = start.mul_add(L::splat(dh), L::splat(h0));
+            let (f, slope) = over_cell(corners, [fx, fy], [mx, my], [h, length * L::splat(dh)]);
 
             // How far the ends are from corners of the cell: see below.
             let (gone_x, gone_y) = (fx + mx, fy + my);
@@ -151,15 +145,13 @@ impl Chord {
             let (apart_x, apart_y) = (gone_x.min(one - gone_x), gone_y.min(one - gone_y));
             let end = (leaves_x - leaves_y).select_negative(apart_y, apart_x);
             let end = (leaves - one).select_negative(end, apart_x.min(apart_y));
-            let slope =
-                bottom.abs().max((bottom + twist).abs()) + left.abs().max((left + twist).abs());
             let unused = L::splat(count - 0.5) - numbers;
             steepest = steepest.max(unused.select_negative(zero, slope));
             cells.start[batch] = start.to_array();
             cells.length[batch] = length.to_array();
-            cells.f[0][batch] = f0.to_array();
-            cells.f[1][batch] = f1.to_array();
-            cells.f[2][batch] = f2.to_array();
+            cells.f[0][batch] = f[0].to_array();
+            cells.f[1][batch] = f[1].to_array();
+            cells.f[2][batch] = f[2].to_array();
             cells.off[batch] = begin.min(end).to_array();
         }
         // The curve is in a lane's cell, or in the next or last one, as far as it is from the chord. Where the chord passes a
@@ -177,17 +169,8 @@ impl Chord {
             let f2 = L::from_array(cells.f[2][batch]);
             let off = (L::from_array(cells.off[batch]) - L::splat(2.0 * near))
                 .select_negative(L::splat(wide), L::splat(off));
-            // With the sign at the start made positive: can f come within `off` of 0?
-            let g0 = f0.abs() - off;
-            let g1 = f0.select_negative(zero - f1, f1);
-            let g2 = f0.select_negative(zero - f2, f2);
-            let at_end = g0 + g1 + g2;
-            let discriminant = (g0 * L::splat(4.0)).neg_mul_add(g2, g1 * g1);
-            let crosses = g0.sign_mask() | at_end.sign_mask();
-            // The parabola turns between the ends, upward, and has a root.
-            let turns = g1.sign_mask() & !(g1 + g2 + g2).sign_mask() & !discriminant.sign_mask();
             let used = ((1u64 << (count - first).min(LANES as f32) as u32) - 1) as u32;
-            possible |= ((crosses | turns) & used) << (batch * LANES);
+            possible |= (may_cross([f0, f1, f2], off) & used) << (batch * LANES);
             cells.off[batch] = off.to_array();
         }
         if possible == 0 {
@@ -248,6 +231,51 @@ impl Chord {
     }
 }
 
+/// h - D over a stretch of a cell with these corners, as coefficients of 1, s, s^2 with s from 0 to 1; and the steepest that D
+/// is in the cell. The stretch begins at (x, y) in it, with a height, and moves by as much.
+#[inline(always)]
+pub fn over_cell<L: Lanes>(
+    [h00, h10, h01, h11]: [L; 4],
+    [x, y]: [L; 2],
+    [dx, dy]: [L; 2],
+    [h, dh]: [L; 2],
+) -> ([L; 3], L) {
+    let (bottom, left) = (h10 - h00, h01 - h00);
+    let twist = (h11 - h01) - bottom;
+    let slope_x = twist.mul_add(y, bottom);
+    let slope_y = twist.mul_add(x, left);
+    let surface = y.mul_add(left, x.mul_add(slope_x, h00));
+    let f1 = slope_y.neg_mul_add(dy, slope_x.neg_mul_add(dx, dh));
+    let f2 = (twist * dx).neg_mul_add(dy, L::splat(0.0));
+    let slope = bottom.abs().max((bottom + twist).abs()) + left.abs().max((left + twist).abs());
+    ([h - surface, f1, f2], slope)
+}
+
+/// The lanes in which a quadratic on [0, 1] may come within `off` of 0.
+#[inline(always)]
+pub fn may_cross<L: Lanes>([f0, f1, f2]: [L; 3], off: L) -> u32 {
+    let zero = L::splat(0.0);
+    // With the sign at the start made positive.
+    let g0 = f0.abs() - off;
+    let g1 = f0.select_negative(zero - f1, f1);
+    let g2 = f0.select_negative(zero - f2, f2);
+    let at_end = g0 + g1 + g2;
+    let discriminant = (g0 * L::splat(4.0)).neg_mul_add(g2, g1 * g1);
+    let crosses = g0.sign_mask() | at_end.sign_mask();
+    // The parabola turns between the ends, upward, and has a root.
+    let turns = g1.sign_mask() & !(g1 + g2 + g2).sign_mask() & !discriminant.sign_mask();
+    crosses | turns
+}
+
+/// The root of f0 + f1 r + f2 r^2 in (0, 1], about, where there is one.
+#[inline(always)]
+pub fn root(f0: f32, f1: f32, f2: f32) -> f32 {
+    let root = (f1 * f1 - 4.0 * f0 * f2).max(0.0).sqrt();
+    let q = -0.5 * (f1 + root.copysign(f1));
+    let (a, b) = (q / f2, f0 / q);
+    if (0.0..=1.0).contains(&a) { a } else { b }
+}
+
 #[inline(always)]
 fn of(row: &Row, lane: usize) -> f32 {
     row.as_flattened()[lane % (BATCHES * LANES)]
@@ -266,13 +294,4 @@ fn first(possible: u32, start: &Row) -> usize {
         }
     }
     best
-}
-
-/// The root of f0 + f1 r + f2 r^2 in (0, 1], about, where there is one.
-#[inline(always)]
-fn root(f0: f32, f1: f32, f2: f32) -> f32 {
-    let root = (f1 * f1 - 4.0 * f0 * f2).max(0.0).sqrt();
-    let q = -0.5 * (f1 + root.copysign(f1));
-    let (a, b) = (q / f2, f0 / q);
-    if (0.0..=1.0).contains(&a) { a } else { b }
 }

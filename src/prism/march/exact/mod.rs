@@ -8,9 +8,11 @@
 //! g(s) = w |N'| - D at the ends of what is left say where a root is, and a bracketed Newton iteration finds it. So a spike one texel wide
 //! is found, and the number of crossings in a prism has the parity of the signs at its ends, which neighbours share.
 
+mod abreast;
 mod arcs;
 mod cells;
 mod children;
+mod chords;
 mod explain;
 mod landing;
 mod lod;
@@ -28,6 +30,7 @@ use crate::prism::curve::{Curve, Cut, Stretch, View};
 use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::{Lanes, Quad, Task};
 use crate::surface::{DisplacedSurface, Patch};
+pub use abreast::search_arcs;
 pub use arcs::{Arcs, Cut as CutArcs, Found as FoundArcs, Units};
 pub use explain::explain;
 use pieces::Piece;
@@ -82,6 +85,17 @@ pub struct Found {
     pub above: bool,
     /// dS/du x dS/dv, where that has been asked for already.
     pub ng: Option<DVec3>,
+}
+
+impl Found {
+    /// A crossing of which no one asks where it is.
+    const ANY: Self = Self {
+        t: 0.0,
+        u: 0.0,
+        v: 0.0,
+        above: true,
+        ng: None,
+    };
 }
 
 /// The first crossing on an arc that f32 set up, or any.

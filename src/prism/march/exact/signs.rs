@@ -14,6 +14,7 @@ use super::roots::{Breaks, crossing, dip, height};
 use super::{Found, Problem};
 
 /// What has been seen along a prism's curve so far.
+#[derive(Clone, Copy)]
 pub struct Signs<'a, Q> {
     problem: &'a Problem<'a>,
     frame: &'a RayFrame,
@@ -163,13 +164,7 @@ impl<'a, Q: Quad> Signs<'a, Q> {
     /// Ends the search with a crossing of which no one asks where it is.
     #[inline(always)]
     pub fn found_any(&mut self) {
-        self.nearest = Some(Found {
-            t: 0.0,
-            u: 0.0,
-            v: 0.0,
-            above: true,
-            ng: None,
-        });
+        self.nearest = Some(Found::ANY);
         self.done = true;
     }
 

@@ -22,22 +22,26 @@ pub const CLOSE: f32 = 1.0 / 64.0;
 /// Texels beyond which a span has 15 children.
 const WIDE: f32 = 10.0;
 
+/// Parameters closer than this f32 does not tell apart well.
+pub const SHORTEST: f32 = 16.0 * f32::EPSILON;
+
 /// One arc, ready to be walked.
+#[derive(Clone, Copy)]
 pub struct Walker<'a> {
     problem: &'a Problem<'a>,
     arcs: &'a Arcs,
     lane: usize,
     /// The arc's point of reference, from its texel base.
-    origin: [f32; 2],
+    pub origin: [f32; 2],
     /// The stored value that displaces by nothing.
-    midlevel: f32,
-    grid: Grid<'a>,
+    pub midlevel: f32,
+    pub grid: Grid<'a>,
     /// The arc's texel base, within one period of the map.
-    base: [f32; 2],
+    pub base: [f32; 2],
     /// The arc's point of reference in ray parameters.
     time_base: f64,
     /// The parameters between which crossings are looked for.
-    whole: [f32; 2],
+    pub whole: [f32; 2],
     /// tnear and tfar from the arc's point of reference in time, narrowed by all doubt.
     surely: [f32; 2],
     /// Whether the arc's ends are above the surface, where that is known.
@@ -309,11 +313,17 @@ impl<'a> Walker<'a> {
 
         let zero = L::splat(0.0);
         let (mut x, mut y, mut h) = ([zero; R], [zero; R], [zero; R]);
+        let places = self.arcs.places_of::<L>(l);
+        let reference = [
+            L::splat(self.origin[0]),
+            L::splat(self.origin[1]),
+            L::splat(self.midlevel),
+        ];
         for r in 0..R {
             let first = 8.0 * r as f32;
             let numbers = L::from_array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
             let s = (numbers + L::splat(first)).mul_add(L::splat(ds), L::splat(from));
-            (x[r], y[r], h[r]) = self.evaluate(s);
+            [x[r], y[r], h[r]] = places.at(s, reference);
         }
         let (mut all_above, mut all_below) = (0, 0);
         let mut range = [zero; R];
@@ -360,7 +370,7 @@ impl<'a> Walker<'a> {
         let ds = (span[1] - span[0]) / ends.children as f32;
         let (bend, height_bend) = (self.arcs.bend[l], self.arcs.height_bend[l]);
         // f32 cannot tell the parts of such a span from one another: f64 looks at its ends.
-        if span[1] - span[0] < 16.0 * f32::EPSILON {
+        if span[1] - span[0] < SHORTEST {
             let (a, b) = (f64::from(span[0]), f64::from(span[1]));
             for s in [a, b] {
                 let point = signs.look::<L>(s, Side::Unknown);
@@ -408,35 +418,6 @@ impl<'a> Walker<'a> {
         }
         0
     }
-
-    /// (x, y) and the height at eight parameters of the arc.
-    #[inline(always)]
-    fn evaluate<L: Lanes>(&self, s: L) -> (L, L, L) {
-        let (arcs, l) = (self.arcs, self.lane);
-        let inverse = L::splat(1.0) / quadratic(&arcs.area, l, s);
-        let x = quadratic(&arcs.x, l, s).mul_add(inverse, L::splat(self.origin[0]));
-        let y = quadratic(&arcs.y, l, s).mul_add(inverse, L::splat(self.origin[1]));
-        let u = quadratic(&arcs.u, l, s) * inverse;
-        let v = quadratic(&arcs.v, l, s) * inverse;
-        // |N'|^2 = 1 - sum b_i b_j spread_ij.
-        let one = L::splat(1.0);
-        let b0 = one - u - v;
-        let [k01, k02, k12] = &arcs.spread;
-        let short = (b0 * v).mul_add(L::splat(k02[l]), u * v * L::splat(k12[l]));
-        let short = (b0 * u).mul_add(L::splat(k01[l]), short);
-        let length = (one - short).max(L::splat(0.0)).sqrt();
-        let w = s.mul_add(L::splat(arcs.height[1][l]), L::splat(arcs.height[0][l]));
-        (x, y, w.mul_add(length, L::splat(self.midlevel)))
-    }
-}
-
-/// c0 + c1 s + c2 s^2, of one lane.
-#[inline(always)]
-fn quadratic<L: Lanes>([c0, c1, c2]: &[[f32; LANES]; 3], lane: usize, s: L) -> L {
-    s.mul_add(
-        s.mul_add(L::splat(c2[lane]), L::splat(c1[lane])),
-        L::splat(c0[lane]),
-    )
 }
 
 /// Register r of a row, moved by one lane.
