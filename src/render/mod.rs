@@ -213,7 +213,7 @@ pub struct Outcome {
 /// As [`render()`].
 pub fn render_frame(input: &RenderInput, frame: &mut Frame, mut control: Control) -> Outcome {
     let integrator = integrator::prepare(input);
-    let renderer = TileRenderer::new(input.camera, input.film, &*integrator);
+    let renderer = TileRenderer::new(input.camera, input.film, input.tracer, &*integrator);
     let passes = passes(frame.samples(), input.film.progressive);
     let grids = passes.iter().map(|pass| {
         let side = control.tile.unwrap_or_else(|| tile_side(pass.len() as u32));

@@ -6,10 +6,12 @@ use super::filter::PixelFilter;
 use super::frame::{Frame, pixels};
 use super::pixel::Pixel;
 use super::sample::FirstHit;
+use crate::ray::{Ray, RayPacket};
 use crate::render::camera::Eye;
-use crate::render::integrator::{Integrator, RayCounts};
+use crate::render::integrator::{CameraRay, Integrator, RayCounts};
 use crate::render::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::{Camera, Film, Projection, Window};
+use crate::trace::{Hit, Tracer};
 
 /// All that turns a tile into pixels.
 pub struct TileRenderer<'a> {
@@ -18,9 +20,18 @@ pub struct TileRenderer<'a> {
     /// Depth is measured along this from the eye; from a panorama it is the distance.
     view: Option<Vec3>,
     filter: PixelFilter,
+    tracer: &'a dyn Tracer,
+    /// Whether camera rays are traced eight by eight.
+    in_packets: bool,
     integrator: &'a dyn Integrator,
     seed: u32,
     clamp: Option<f32>,
+}
+
+/// First hits of the camera rays of eight samples of a pixel.
+struct Bundle {
+    first: u32,
+    hits: [Option<Hit>; RayPacket::LANES],
 }
 
 /// What became of a tile.
@@ -34,13 +45,20 @@ pub struct TileOutcome {
 
 impl<'a> TileRenderer<'a> {
     /// Pictures of `film` through `camera`.
-    pub fn new(camera: &Camera, film: &Film, integrator: &'a dyn Integrator) -> Self {
+    pub fn new(
+        camera: &Camera,
+        film: &Film,
+        tracer: &'a dyn Tracer,
+        integrator: &'a dyn Integrator,
+    ) -> Self {
         Self {
             camera: Eye::new(camera, film.width, film.height),
             eye: camera.position,
             view: (camera.projection != Projection::Panorama)
                 .then(|| (camera.target - camera.position).normalize_or(Vec3::NEG_Z)),
             filter: PixelFilter::new(film.filter),
+            tracer,
+            in_packets: film.spp >= RayPacket::LANES as u32,
             integrator,
             seed: film.seed,
             clamp: film.clamp,
@@ -56,12 +74,14 @@ impl<'a> TileRenderer<'a> {
         };
         for (index, place) in pixels(tile.window()).enumerate() {
             let mut pixel = tile.pixel(index);
+            let mut bundle = None;
             while let Some(sample) = tile.next_sample(&pixel).filter(|&next| next < until) {
                 if stop() {
                     outcome.stopped = true;
                     break;
                 }
-                self.sample(place, sample, &mut pixel, tile, &mut outcome.rays);
+                let hit = self.hit(place, sample, &mut bundle);
+                self.sample(place, sample, hit, &mut pixel, tile, &mut outcome.rays);
             }
             tile.set_pixel(index, &pixel);
             if outcome.stopped {
@@ -71,14 +91,30 @@ impl<'a> TileRenderer<'a> {
         outcome
     }
 
-    fn sample(
-        &self,
-        place: UVec2,
-        index: u32,
-        pixel: &mut Pixel,
-        tile: &Frame,
-        rays: &mut RayCounts,
-    ) {
+    /// What the camera ray of a pixel's sample meets first. In packets these are the rays of eight samples that follow one another
+    /// from a multiple of eight on, always all of them, so that no bit of a hit depends on which are asked for.
+    fn hit(&self, place: UVec2, index: u32, bundle: &mut Option<Bundle>) -> Option<Hit> {
+        if !self.in_packets {
+            return self.tracer.intersect(&self.ray(place, index).0);
+        }
+        let lane = index % RayPacket::LANES as u32;
+        let first = index - lane;
+        if bundle.as_ref().is_none_or(|bundle| bundle.first != first) {
+            let mut rays = RayPacket::EMPTY;
+            for lane in 0..RayPacket::LANES {
+                let index = first.saturating_add(lane as u32);
+                rays.set(lane, &self.ray(place, index).0);
+            }
+            *bundle = Some(Bundle {
+                first,
+                hits: self.tracer.intersect8(&rays),
+            });
+        }
+        bundle.as_ref()?.hits[lane as usize]
+    }
+
+    /// The camera ray of a pixel's sample, what it is drawn with, and the sign that it counts with.
+    fn ray(&self, place: UVec2, index: u32) -> (Ray, Sampler, i32) {
         let dimension = Dimension::new(0, Purpose::Film);
         let sampler = Sampler::new(place, index, self.seed);
         let placement = self.filter.place(index, sampler.point(dimension));
@@ -86,13 +122,28 @@ impl<'a> TileRenderer<'a> {
         let lens = sampler.point(Dimension::new(0, Purpose::Lens));
         let mut ray = self.camera.ray(centre + placement.offset, lens);
         ray.key = sampler.ray_key(dimension);
-        let mut sample = self.integrator.sample(&ray, &sampler, rays);
+        (ray, sampler, placement.sign)
+    }
+
+    fn sample(
+        &self,
+        place: UVec2,
+        index: u32,
+        hit: Option<Hit>,
+        pixel: &mut Pixel,
+        tile: &Frame,
+        rays: &mut RayCounts,
+    ) {
+        let (ray, sampler, sign) = self.ray(place, index);
+        let mut sample = self
+            .integrator
+            .sample(&CameraRay { ray, hit }, &sampler, rays);
         sample.radiance = clamped(sample.radiance, self.clamp);
         let depth = |hit: FirstHit| self.depth(hit.position);
         let object = |hit: FirstHit| tile.objects().hash(hit.object);
         pixel.add(
             &sample,
-            placement.sign,
+            sign,
             sample.first.map_or(0.0, depth),
             sample.first.map_or(0, object),
         );
@@ -156,8 +207,53 @@ impl TileGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::Ray;
+    use crate::ray::Aabb;
     use crate::render::film::{CameraSample, Objects};
+
+    /// An empty scene that is asked either about single rays or about full packets.
+    struct Nothing {
+        in_packets: bool,
+    }
+
+    const EMPTY: Nothing = Nothing { in_packets: true };
+
+    impl Tracer for Nothing {
+        fn intersect(&self, _: &Ray) -> Option<Hit> {
+            assert!(!self.in_packets);
+            None
+        }
+        fn intersect8(&self, rays: &RayPacket) -> [Option<Hit>; RayPacket::LANES] {
+            assert!(self.in_packets && rays.valid() == u8::MAX);
+            [None; RayPacket::LANES]
+        }
+        fn occluded(&self, _: &Ray) -> bool {
+            false
+        }
+        fn bounds(&self) -> Aabb {
+            Aabb::EMPTY
+        }
+        fn bvh_bytes(&self) -> usize {
+            0
+        }
+        fn name(&self) -> String {
+            "nothing".into()
+        }
+    }
+
+    #[test]
+    fn camera_rays_go_in_full_packets_where_there_are_eight_samples() {
+        for spp in [1, 7, 8, 13] {
+            let film = Film { spp, ..film() };
+            let in_packets = spp >= 8;
+            let mut frame = Frame::new(&film, 0..spp, Objects::default());
+            TileRenderer::new(&Camera::default(), &film, &Nothing { in_packets }, &Broken).render(
+                &mut frame,
+                spp,
+                &|| false,
+            );
+            assert!(frame.is_complete());
+        }
+    }
 
     #[test]
     fn tiles_cover_every_pixel_once() {
@@ -181,9 +277,9 @@ mod tests {
     struct Broken;
 
     impl Integrator for Broken {
-        fn sample(&self, ray: &Ray, _: &Sampler, rays: &mut RayCounts) -> CameraSample {
+        fn sample(&self, camera: &CameraRay, _: &Sampler, rays: &mut RayCounts) -> CameraSample {
             rays.camera += 1;
-            CameraSample::background(match ray.key % 3 {
+            CameraSample::background(match camera.ray.key % 3 {
                 0 => Vec3::new(1.0, f32::NAN, 1.0),
                 1 => Vec3::new(1.0, 1.0, f32::INFINITY),
                 _ => Vec3::ONE,
@@ -205,8 +301,11 @@ mod tests {
     fn a_broken_sample_is_counted_and_never_spreads() {
         let film = film();
         let mut frame = Frame::new(&film, 0..32, Objects::default());
-        let outcome =
-            TileRenderer::new(&Camera::default(), &film, &Broken).render(&mut frame, 32, &|| false);
+        let outcome = TileRenderer::new(&Camera::default(), &film, &EMPTY, &Broken).render(
+            &mut frame,
+            32,
+            &|| false,
+        );
         assert!(frame.radiance().iter().all(|&p| p == Vec3::ONE));
         assert_eq!(outcome.rays.camera, 8 * 8 * 32);
         assert!(frame.is_complete() && !outcome.stopped);
@@ -217,7 +316,7 @@ mod tests {
     #[test]
     fn a_stopped_tile_goes_on_to_the_same_bits() {
         let film = film();
-        let renderer = TileRenderer::new(&Camera::default(), &film, &Broken);
+        let renderer = TileRenderer::new(&Camera::default(), &film, &EMPTY, &Broken);
         let mut whole = Frame::new(&film, 0..32, Objects::default());
         let mut stopped = whole.clone();
         renderer.render(&mut whole, 32, &|| false);
@@ -238,7 +337,8 @@ mod tests {
     fn depth_is_along_the_view_but_for_panoramas() {
         let mut camera = Camera::default();
         let aside = Vec3::new(3.0, 0.0, -4.0);
-        let depth = |camera: &Camera| TileRenderer::new(camera, &film(), &Broken).depth(aside);
+        let depth =
+            |camera: &Camera| TileRenderer::new(camera, &film(), &EMPTY, &Broken).depth(aside);
         assert_eq!(depth(&camera), 4.0);
         camera.projection = Projection::Panorama;
         assert_eq!(depth(&camera), 5.0);

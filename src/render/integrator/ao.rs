@@ -8,7 +8,7 @@ use super::super::bsdf::cosine_hemisphere;
 use super::super::film::CameraSample;
 use super::super::sampler::{Dimension, Purpose, Sampler};
 use super::stage::Stage;
-use super::{Integrator, RayCounts};
+use super::{CameraRay, Integrator, RayCounts};
 use crate::ray::Ray;
 
 /// One ray per sample over the hemisphere of the smooth normal, weighted by the cosine; white where it meets nothing
@@ -29,12 +29,12 @@ impl<'a> Ao<'a> {
 }
 
 impl Integrator for Ao<'_> {
-    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample {
+    fn sample(&self, camera: &CameraRay, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample {
         rays.camera += 1;
-        let Some(met) = self.stage.meet(camera_ray, &self.stage.cone) else {
+        let Some(met) = self.stage.met_first(camera) else {
             return CameraSample::background(Vec3::ONE);
         };
-        let point = self.stage.shade(camera_ray, &met, 1.0, 0.0);
+        let point = self.stage.shade(&camera.ray, &met, 1.0, 0.0);
         let dimension = Dimension::new(0, Purpose::Bounce);
         let local = cosine_hemisphere(sampler.point(dimension));
         let direction = Basis::around(point.shading_normal()).to_world(local);

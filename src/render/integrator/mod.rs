@@ -12,6 +12,7 @@ use super::film::CameraSample;
 use super::sampler::Sampler;
 use crate::ray::Ray;
 use crate::scene;
+use crate::trace::Hit;
 
 /// Rays traced, by type.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,10 +58,20 @@ impl std::ops::AddAssign for RayCounts {
     }
 }
 
+/// A ray from the camera, and its first hit.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRay {
+    /// The ray.
+    pub ray: Ray,
+    /// What it meets first.
+    pub hit: Option<Hit>,
+}
+
 /// Estimates the radiance that arrives along a camera ray.
 pub trait Integrator: Sync {
-    /// One estimate, and what the ray met first. `sampler` is its only randomness; the rays it traces are added to `rays`.
-    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample;
+    /// One estimate, and what the ray met first. `sampler` is its only randomness; this ray and the others that are traced are added to
+    /// `rays`.
+    fn sample(&self, camera: &CameraRay, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample;
 }
 
 /// The opaque object that the camera is inside of, where no light can be.

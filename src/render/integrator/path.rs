@@ -16,9 +16,10 @@ use super::super::sampler::{Dimension, Purpose, Sampler};
 use super::super::shading::ShadedPoint;
 use super::bodies::Bodies;
 use super::stage::{Met, Stage};
-use super::{Integrator, RayCounts};
+use super::{CameraRay, Integrator, RayCounts};
 use crate::ray::{Cone, Ray};
 use crate::scene::{Material, PathLimits};
+use crate::trace::Hit;
 
 /// Most surfaces along a path, holes and hidden boundaries included.
 const MOST_CROSSINGS: u32 = 1024;
@@ -86,6 +87,8 @@ pub struct Path<'a> {
 /// A path on its way.
 struct Walk<'s, 'r> {
     ray: Ray,
+    /// Its first hit, where that is known already.
+    known: Option<Option<Hit>>,
     /// Around it.
     cone: Cone,
     /// Radiance found so far, and what more of it counts.
@@ -128,7 +131,10 @@ impl<'a> Path<'a> {
 
     /// One step: to the next surface, its light, and on. False where the path ends.
     fn step(&self, walk: &mut Walk) -> bool {
-        let met = self.stage.meet(&walk.ray, &walk.cone);
+        let met = match walk.known.take() {
+            Some(hit) => hit.map(|hit| self.stage.met(hit, &walk.ray, &walk.cone)),
+            None => self.stage.meet(&walk.ray, &walk.cone),
+        };
         let reach = met.map_or(f32::INFINITY, |m| m.hit.t);
         self.meet_lights(walk, reach);
         let Some(met) = met else {
@@ -304,10 +310,11 @@ impl<'a> Path<'a> {
 }
 
 impl Integrator for Path<'_> {
-    fn sample(&self, camera_ray: &Ray, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample {
+    fn sample(&self, camera: &CameraRay, sampler: &Sampler, rays: &mut RayCounts) -> CameraSample {
         rays.camera += 1;
         let mut walk = Walk {
-            ray: *camera_ray,
+            ray: camera.ray,
+            known: Some(camera.hit),
             cone: self.stage.cone,
             radiance: Vec3::ZERO,
             throughput: Vec3::ONE,
@@ -339,6 +346,17 @@ impl Bounces {
             Bounce::Diffuse => self.diffuse += 1,
             Bounce::Glossy => self.glossy += 1,
             Bounce::Transmission => self.transmission += 1,
+        }
+    }
+}
+
+#[cfg(test)]
+impl Path<'_> {
+    /// A camera ray of this path's scene.
+    pub fn camera_ray(&self, ray: Ray) -> CameraRay {
+        CameraRay {
+            ray,
+            hit: self.stage.tracer.intersect(&ray),
         }
     }
 }

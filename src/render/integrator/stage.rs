@@ -10,6 +10,7 @@ use super::super::material;
 use super::super::sampler::{Dimension, Purpose, Sampler};
 use super::super::shading::{ShadedPoint, is_outside};
 use super::super::{RenderInput, Surfaces};
+use super::CameraRay;
 use super::bodies::Bodies;
 use crate::ray::{Cone, Ray};
 use crate::scene::Material;
@@ -67,15 +68,25 @@ impl<'a> Stage<'a> {
     /// The first hit of `ray`, as the cone around it sees the surface.
     pub fn meet(&self, ray: &Ray, cone: &Cone) -> Option<Met<'a>> {
         let hit = self.tracer.intersect(ray)?;
+        Some(self.met(hit, ray, cone))
+    }
+
+    /// The same where the hit is known.
+    pub fn met(&self, hit: Hit, ray: &Ray, cone: &Cone) -> Met<'a> {
         let point = self.surfaces.seen_point(&hit, ray, cone);
         let index = self.object_materials[self.surfaces.object(&hit)];
-        Some(Met {
+        Met {
             hit,
             point,
             index,
             material: &self.materials[index],
             from_outside: is_outside(&point, -ray.direction),
-        })
+        }
+    }
+
+    /// What a camera ray meets first.
+    pub fn met_first(&self, camera: &CameraRay) -> Option<Met<'a>> {
+        Some(self.met(camera.hit?, &camera.ray, &self.cone))
     }
 
     /// What `ray` met, ready for shading. `eta` is the index of refraction beyond it over that before it; what is

@@ -7,7 +7,7 @@ use super::super::film::CameraSample;
 use super::super::sampler::Sampler;
 use super::super::shading::ShadedPoint;
 use super::stage::{Met, Stage};
-use super::{Integrator, RayCounts};
+use super::{CameraRay, Integrator, RayCounts};
 use crate::prism::count_steps;
 use crate::ray::Ray;
 use crate::scene::View;
@@ -60,11 +60,11 @@ impl<'a> Look<'a> {
 }
 
 impl Integrator for Look<'_> {
-    fn sample(&self, camera_ray: &Ray, _: &Sampler, rays: &mut RayCounts) -> CameraSample {
+    fn sample(&self, camera: &CameraRay, _: &Sampler, rays: &mut RayCounts) -> CameraSample {
         rays.camera += 1;
-        let met = self.stage.meet(camera_ray, &self.stage.cone);
+        let met = self.stage.met_first(camera);
         let cost = match self.view {
-            View::Cost => self.cost(camera_ray, met.map_or(camera_ray.tfar, |met| met.hit.t)),
+            View::Cost => self.cost(&camera.ray, met.map_or(camera.ray.tfar, |met| met.hit.t)),
             _ => 0,
         };
         let Some(met) = met else {
@@ -73,7 +73,7 @@ impl Integrator for Look<'_> {
                 ..CameraSample::background(heat(cost))
             };
         };
-        let point = self.stage.shade(camera_ray, &met, met.material.ior, 0.0);
+        let point = self.stage.shade(&camera.ray, &met, met.material.ior, 0.0);
         CameraSample {
             radiance: self.show(&met, &point, cost),
             first: Some(self.stage.first_hit(&met, &point)),

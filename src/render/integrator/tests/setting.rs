@@ -95,7 +95,7 @@ fn mean(path: &Path, n: u32, ray: impl Fn(Vec2) -> Ray) -> Vec3 {
     let sum: Vec3 = (0..n)
         .map(|i| {
             let sampler = Sampler::new(UVec2::new(5, 9), i, 1);
-            path.sample(&ray(random.point()), &sampler, &mut counts)
+            path.sample(&path.camera_ray(ray(random.point())), &sampler, &mut counts)
                 .radiance
         })
         .sum();
