@@ -15,7 +15,7 @@ use common::scene::{displaced, uniform};
 use common::timing::{RayTimes, option};
 use prismarch::embree::{EmbreeOptions, EmbreeTracer};
 use prismarch::prism::{Lod, March, PrismOptions, Prisms, SimdLevel};
-use prismarch::trace::{Object, Placement, Shape, World};
+use prismarch::trace::{Object, Placement, Shape, Tracer, World};
 
 struct Contestant {
     march: March,
@@ -31,6 +31,24 @@ struct Contestant {
 }
 
 const THREADS: [usize; 2] = [1, 2];
+
+impl Contestant {
+    /// Primary hits, and how many of them are not the same to the bit in packets.
+    fn packets_against_single(&self) -> (usize, usize) {
+        let packets = &self.packets.primary;
+        let hits = packets
+            .iter()
+            .flat_map(|packet| self.tracer.intersect8(packet));
+        let pairs = hits.zip(&self.rays.primary);
+        pairs.fold((0, 0), |(hits, differ), (hit, ray)| {
+            let single = self.tracer.intersect(ray);
+            (
+                hits + usize::from(single.is_some()),
+                differ + usize::from(hit != single),
+            )
+        })
+    }
+}
 
 fn main() {
     let map = boulder::map(option("--map", 4096));
@@ -95,6 +113,15 @@ fn main() {
         }
     }
 
+    for contestant in &contestants {
+        let (hits, differ) = contestant.packets_against_single();
+        println!(
+            "{}, {}: {differ} of {hits} primary hits have other bits in packets",
+            name(contestant.march, contestant.lod),
+            contestant.simd.name(),
+        );
+    }
+    println!();
     println!("| march | kernel | threads | primary | bounce | occlusion |");
     println!("| --- | --- | --- | --- | --- | --- |");
     for contestant in &contestants {

@@ -279,8 +279,9 @@ impl<Q: Quad> View<Q> {
 
     /// All stretches of both signs: for the few rays that leave through a bent side and come back, see the triangle turn
     /// over, or lie in the plane of a side.
-    #[cold]
-    #[inline(never)]
+    ///
+    /// Long: called in outlined tasks only.
+    #[inline(always)]
     pub fn stretches(&self, range: [f64; 2]) -> Stretches {
         let mut found = Stretches::new();
         for counter_clockwise in [true, false] {
@@ -290,6 +291,7 @@ impl<Q: Quad> View<Q> {
     }
 
     /// Sorts all roots and keeps the stretches whose middle is inside.
+    #[inline(always)]
     fn sort_cuts(&self, [low, high]: [f64; 2], counter_clockwise: bool, found: &mut Stretches) {
         let sides = self.roots(counter_clockwise);
         let [c0, c1, c2] = sides.coefficients.map(Q::to_array);

@@ -27,80 +27,43 @@ pub struct Kernel {
     packets: Option<(Intersect8, Occluded8)>,
 }
 
-/// The packet tests of the exact march.
-fn packets(level: SimdLevel) -> (Intersect8, Occluded8) {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    fn intersect_avx2(
-        prisms: &Prisms,
-        primitive: u32,
-        rays: &RayPacket,
-        valid: u8,
-        hits: &mut Hits,
-    ) -> u8 {
-        packet::intersect::<super::simd::Avx2>(prisms, primitive, rays, valid, hits)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    fn occluded_avx2(prisms: &Prisms, primitive: u32, rays: &RayPacket, valid: u8) -> [u8; 2] {
-        packet::occluded::<super::simd::Avx2>(prisms, primitive, rays, valid)
-    }
-
-    let portable: (Intersect8, Occluded8) =
-        (packet::intersect::<Portable>, packet::occluded::<Portable>);
-    match level {
-        SimdLevel::Baseline => portable,
-        #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx2 => (
-            // SAFETY: the machine supports AVX2 and FMA, or this function would not have been chosen.
-            |prisms, primitive, rays, valid, hits| unsafe {
-                intersect_avx2(prisms, primitive, rays, valid, hits)
-            },
-            // SAFETY: as above.
-            |prisms, primitive, rays, valid| unsafe {
-                occluded_avx2(prisms, primitive, rays, valid)
-            },
-        ),
-        #[cfg(not(target_arch = "x86_64"))]
-        SimdLevel::Avx2 => portable,
-    }
-}
-
-/// The hit tests of one march, for [`Portable`] lanes and for AVX2.
-macro_rules! stamps {
-    ($march:ident, $level:expr) => {{
+/// A function of a march for a level: for [`Portable`] lanes, or for AVX2.
+macro_rules! stamped {
+    ($level:expr, $march:ident::$function:ident($($name:ident: $type:ty),*) -> $output:ty) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2,fma")]
-        fn intersect_avx2(prisms: &Prisms, primitive: u32, ray: &Ray) -> Option<PrismHit> {
-            $march::intersect::<super::simd::Avx2>(prisms, primitive, ray)
+        fn avx2($($name: $type),*) -> $output {
+            $march::$function::<super::simd::Avx2>($($name),*)
         }
 
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx2,fma")]
-        fn occluded_avx2(prisms: &Prisms, primitive: u32, ray: &Ray) -> bool {
-            $march::occluded::<super::simd::Avx2>(prisms, primitive, ray)
-        }
-
-        #[cfg(target_arch = "x86_64")]
-        let avx2: (Intersect, Occluded) = (
-            // SAFETY: the machine supports AVX2 and FMA, or this function would not have been chosen.
-            |prisms, primitive, ray| unsafe { intersect_avx2(prisms, primitive, ray) },
-            // SAFETY: as above.
-            |prisms, primitive, ray| unsafe { occluded_avx2(prisms, primitive, ray) },
-        );
-        let portable: (Intersect, Occluded) = (
-            $march::intersect::<Portable>,
-            $march::occluded::<Portable>,
-        );
+        let portable: fn($($type),*) -> $output = $march::$function::<Portable>;
         match $level {
             SimdLevel::Baseline => portable,
+            // SAFETY: the machine supports AVX2 and FMA, or this function would not have been chosen.
             #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx2 => avx2,
+            SimdLevel::Avx2 => |$($name),*| unsafe { avx2($($name),*) },
             #[cfg(not(target_arch = "x86_64"))]
             SimdLevel::Avx2 => portable,
         }
     }};
+}
+
+/// The hit tests of a march for single rays.
+macro_rules! single {
+    ($level:expr, $march:ident) => {
+        (
+            stamped!($level, $march::intersect(prisms: &Prisms, prim: u32, ray: &Ray) -> Option<PrismHit>),
+            stamped!($level, $march::occluded(prisms: &Prisms, prim: u32, ray: &Ray) -> bool),
+        )
+    };
+}
+
+/// Those of the exact march for packets.
+fn packets(level: SimdLevel) -> (Intersect8, Occluded8) {
+    (
+        stamped!(level, packet::intersect(prisms: &Prisms, prim: u32, rays: &RayPacket, valid: u8, hits: &mut Hits) -> u8),
+        stamped!(level, packet::occluded(prisms: &Prisms, prim: u32, rays: &RayPacket, valid: u8) -> [u8; 2]),
+    )
 }
 
 impl Kernel {
@@ -131,9 +94,9 @@ impl Kernel {
         } else {
             SimdLevel::Baseline
         };
-        let (intersect, occluded) = match march {
-            March::Exact => stamps!(exact, level),
-            March::Uniform { .. } => stamps!(uniform, level),
+        let (intersect, occluded): (Intersect, Occluded) = match march {
+            March::Exact => single!(level, exact),
+            March::Uniform { .. } => single!(level, uniform),
         };
         Self {
             level,

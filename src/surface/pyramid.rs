@@ -24,10 +24,10 @@ mod build;
 mod entries;
 mod reduce;
 
+use std::sync::Arc;
+
 use axis::Axis;
 pub(crate) use entries::Entries;
-
-use std::sync::Arc;
 
 use super::{Texels, Wrap};
 
@@ -69,6 +69,7 @@ impl LevelRows {
     pub const MOST: usize = 16;
 
     fn new(levels: &[Level]) -> Self {
+        assert!(levels.len() <= Self::MOST, "a map of too many levels");
         let of = |k: usize| &levels[k.min(levels.len() - 1)];
         let row = |value: fn(&Level) -> f32| std::array::from_fn(|k| value(of(k)));
         Self {

@@ -2,8 +2,7 @@
 //!
 //! Every lane goes along its own arc by steps of its own: a step whose box lies wholly above or below the surface's range
 //! is done with, one that does not is cut, until it is a chord. Chords are [walked](super::chords) cell by cell, up to the
-//! first that may be crossed. So far nothing is decided, only excluded; what is left is decided as for single rays. What a lane
-//! does depends on its own ray alone.
+//! first that may be crossed. So far nothing is decided, only excluded; what is left is decided as for single rays.
 
 use super::arcs::{Arcs, Places};
 use super::cells::{Chord, MOST_CELLS, Off, root};
@@ -20,6 +19,9 @@ const MOST_ROUNDS: u32 = 256;
 
 /// The first step, and what a step that does not exclude is cut to.
 const SMALLER: f32 = 0.25;
+
+/// How many times longer the next step is behind two that exclude.
+const LARGER: f32 = 2.0;
 
 /// The first crossings on the arcs in some lanes, or any. Every lane has its problem, its ray's frame, and the ray parameter that is its
 /// arc's point of reference.
@@ -111,6 +113,7 @@ impl<L: Lanes> Task<L> for Abreast<'_> {
             signs: [None; LANES],
             found: [None; LANES],
             walking: lanes,
+            cleared: 0,
             rounds: 0,
         };
         while team.walking != 0 {
@@ -150,6 +153,8 @@ struct Team<'a, L: Lanes> {
     found: [Option<Found>; LANES],
     /// Lanes that are not done.
     walking: u32,
+    /// Lanes whose last step was clear.
+    cleared: u32,
     rounds: u32,
 }
 
@@ -186,7 +191,11 @@ impl<'a, L: Lanes> Team<'a, L> {
             let clear = (above | below) & self.walking & !ready;
             ready |= self.walking & !clear & (is_chord | is_least);
             let smaller = self.walking & !clear & !ready;
-            self.step = L::choose(smaller, length * L::splat(SMALLER), self.step);
+            // What two steps in a row have shown to be clear is likely to go on.
+            let larger = clear & self.cleared;
+            self.cleared = clear;
+            let next = L::choose(larger, length * L::splat(LARGER), self.step);
+            self.step = L::choose(smaller, length * L::splat(SMALLER), next);
             (self.end, self.at_end, self.range) = (end, [x1, y1, h1], high - low);
             self.pass(clear);
         }

@@ -1,0 +1,224 @@
+/* What changes while it is traced, who owns what, and how much of it there is. */
+#define _POSIX_C_SOURCE 200809L
+#include "ball.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+void edits(void) {
+  begin("edits of the map and of vertices, with refit and in dynamic scenes");
+  for (int dynamic = 0; dynamic < 2; dynamic++) {
+    world w = new_world(dynamic ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE);
+    rtcSetGeometryBuildQuality(w.geometry, dynamic ? RTC_BUILD_QUALITY_REFIT : RTC_BUILD_QUALITY_MEDIUM);
+    const float o[3] = {3, 0.1f, 0.1f}, d[3] = {-1, 0, 0};
+    static uint16_t flat[SIDE * SIDE];
+    prismarch_texels t = {flat, PRISMARCH_TEXEL_U16, 0, 0};
+    bool needed = true;
+    EXPECT(prismarch_map_update(w.map, 0, 0, SIDE, SIDE, &t, &needed, NULL) == PRISMARCH_OK);
+    if (needed) {
+      rtcCommitGeometry(w.geometry);
+      rtcCommitScene(w.scene);
+    }
+    EXPECT(prismarch_map_update(w.map, 3, 4, 10, 10, &t, &needed, NULL) == PRISMARCH_OK && !needed);
+    struct RTCRayHit low = ray_at(o, d);
+    intersect1(w.scene, &low, NULL);
+    EXPECT(is_hit(&low) && low.ray.tfar > 2);
+    for (int i = 0; i < SIDE * SIDE; i++)
+      flat[i] = 65535;
+    EXPECT(prismarch_map_update(w.map, 0, 0, SIDE, SIDE, &t, &needed, NULL) == PRISMARCH_OK);
+    if (needed) {
+      rtcCommitGeometry(w.geometry);
+      rtcCommitScene(w.scene);
+    }
+    struct RTCRayHit high = ray_at(o, d);
+    intersect1(w.scene, &high, NULL);
+    EXPECT(is_hit(&high) && fabsf(low.ray.tfar - high.ray.tfar - SCALE) < 0.01f);
+    const ball bigger = new_ball(1.5f);
+    prismarch_vertices v;
+    memset(&v, 0, sizeof v);
+    v.positions.data = bigger.positions;
+    v.normals.data = bigger.normals;
+    EXPECT(prismarch_surface_update_vertices(w.surface, 0, &v, &needed, NULL) == PRISMARCH_OK && needed);
+    rtcCommitGeometry(w.geometry);
+    rtcCommitScene(w.scene);
+    struct RTCRayHit big = ray_at(o, d);
+    intersect1(w.scene, &big, NULL);
+    EXPECT(is_hit(&big) && fabsf(high.ray.tfar - big.ray.tfar - 0.5f) < 0.05f);
+    memset(flat, 0, sizeof flat);
+    free_world(&w);
+  }
+  end();
+}
+
+void motion(void) {
+  begin("motion blur: the surface moves between its time steps");
+  const ball small = new_ball(1), large = new_ball(2);
+  prismarch_map *map = new_map();
+  prismarch_surface_desc d = desc_of(&small, map);
+  prismarch_vertices later;
+  memset(&later, 0, sizeof later);
+  later.positions.data = large.positions;
+  later.normals.data = large.normals;
+  d.time_step_count = 2;
+  d.later_steps = &later;
+  prismarch_surface *surface = surface_of(&d);
+  RTCDevice device = rtcNewDevice(NULL);
+  RTCGeometry geometry = geometry_of(device, surface);
+  rtcCommitGeometry(geometry);
+  RTCScene scene = rtcNewScene(device);
+  rtcAttachGeometry(scene, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene);
+  float t[3];
+  for (int k = 0; k < 3; k++) {
+    const float o[3] = {4, 0.1f, 0.1f}, dir[3] = {-1, 0, 0};
+    struct RTCRayHit q = ray_at(o, dir);
+    q.ray.time = 0.5f * (float)k;
+    intersect1(scene, &q, NULL);
+    EXPECT(is_hit(&q));
+    t[k] = q.ray.tfar;
+  }
+  EXPECT(fabsf(t[0] - t[1] - 0.5f) < 0.06f && fabsf(t[1] - t[2] - 0.5f) < 0.06f);
+  rtcReleaseScene(scene);
+  rtcReleaseDevice(device);
+  prismarch_surface_release(surface);
+  prismarch_map_release(map);
+  end();
+}
+
+void lifetimes(void) {
+  begin("one surface in several devices and scenes, released in any order");
+  const ball b = new_ball(1);
+  for (int order = 0; order < 4; order++) {
+    prismarch_map *map = new_map();
+    const prismarch_surface_desc d = desc_of(&b, map);
+    prismarch_surface *surface = surface_of(&d);
+    RTCDevice devices[2];
+    RTCScene scenes[4];
+    for (int k = 0; k < 2; k++) {
+      devices[k] = rtcNewDevice(NULL);
+      RTCGeometry geometry = geometry_of(devices[k], surface);
+      rtcCommitGeometry(geometry);
+      for (int s = 0; s < 2; s++) {
+        RTCScene scene = scenes[2 * k + s] = rtcNewScene(devices[k]);
+        rtcAttachGeometry(scene, geometry);
+        rtcCommitScene(scene);
+      }
+      rtcReleaseGeometry(geometry);
+    }
+    if (order & 1)
+      prismarch_map_release(map);
+    if (order & 2)
+      prismarch_surface_release(surface);
+    for (int s = 0; s < 4; s++) {
+      const float o[3] = {3, 0.1f, 0.1f}, dir[3] = {-1, 0, 0};
+      struct RTCRayHit q = ray_at(o, dir);
+      intersect1(scenes[s], &q, NULL);
+      EXPECT(is_hit(&q));
+      rtcReleaseScene(scenes[s]);
+    }
+    for (int k = 0; k < 2; k++)
+      rtcReleaseDevice(devices[k]);
+    if (!(order & 2))
+      prismarch_surface_release(surface);
+    if (!(order & 1))
+      prismarch_map_release(map);
+  }
+  end();
+}
+
+typedef struct tracing {
+  RTCScene scene;
+  int hits;
+} tracing;
+
+static void *trace(void *user) {
+  tracing *t = user;
+  for (int i = 0; i < 3000; i++) {
+    const float a = 0.002f * (float)i;
+    const float o[3] = {3 * cosf(a), 3 * sinf(a), 0.1f}, d[3] = {-cosf(a), -sinf(a), 0};
+    struct RTCRayHit q = ray_at(o, d);
+    intersect1(t->scene, &q, NULL);
+    t->hits += is_hit(&q);
+  }
+  return NULL;
+}
+
+static void *join(void *scene) {
+  rtcJoinCommitScene(scene);
+  return NULL;
+}
+
+void threads(void) {
+  begin("threads trace one scene while another is committed; rtcJoinCommitScene");
+  world w = new_world(RTC_SCENE_FLAG_NONE);
+  pthread_t all[3];
+  tracing t[3];
+  for (int k = 0; k < 3; k++) {
+    t[k].scene = w.scene, t[k].hits = 0;
+    pthread_create(&all[k], NULL, trace, &t[k]);
+  }
+  for (int k = 0; k < 10; k++) {
+    RTCScene other = rtcNewScene(w.device);
+    rtcAttachGeometry(other, w.geometry);
+    pthread_t helper;
+    pthread_create(&helper, NULL, join, other);
+    rtcJoinCommitScene(other);
+    pthread_join(helper, NULL);
+    const float o[3] = {3, 0.1f, 0.1f}, d[3] = {-1, 0, 0};
+    struct RTCRayHit q = ray_at(o, d);
+    intersect1(other, &q, NULL);
+    EXPECT(is_hit(&q));
+    rtcReleaseScene(other);
+  }
+  for (int k = 0; k < 3; k++) {
+    pthread_join(all[k], NULL);
+    EXPECT(t[k].hits == 3000);
+  }
+  free_world(&w);
+  end();
+}
+
+static long long held;
+static long long most;
+static bool monitor(void *user, ssize_t bytes, bool post) {
+  (void)user;
+  (void)post;
+  const long long now = __sync_add_and_fetch(&held, (long long)bytes);
+  if (bytes > 0 && most >= 0 && now > most) {
+    __sync_fetch_and_sub(&held, (long long)bytes);
+    return false;
+  }
+  return true;
+}
+
+void memory(void) {
+  begin("memory monitor: counted, and refused without a crash");
+  for (int k = 0; k < 2; k++) {
+    held = 0;
+    most = k ? 1000 : -1;
+    RTCDevice device = rtcNewDevice(NULL);
+    rtcSetDeviceMemoryMonitorFunction(device, monitor, NULL);
+    const ball b = new_ball(1);
+    prismarch_map *map = new_map();
+    const prismarch_surface_desc d = desc_of(&b, map);
+    prismarch_surface *surface = surface_of(&d);
+    RTCGeometry geometry = geometry_of(device, surface);
+    rtcCommitGeometry(geometry);
+    RTCScene scene = rtcNewScene(device);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+    (void)rtcGetDeviceError(device);
+    rtcCommitScene(scene);
+    const enum RTCError error = rtcGetDeviceError(device);
+    EXPECT(k ? error != RTC_ERROR_NONE : error == RTC_ERROR_NONE && held > 0);
+    rtcReleaseScene(scene);
+    rtcReleaseDevice(device);
+    prismarch_surface_release(surface);
+    prismarch_map_release(map);
+  }
+  end();
+}
