@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 use prismarch::prism::{EditBounds, March, PrismOptions, Step};
-use prismarch::ray::Ray;
+use prismarch::ray::{Ray, RayPacket};
 use prismarch::surface::{Displacement, MeshBuilder, TexelRect, Texels, UvTransform, Wrap};
 
 pub struct Input<'b>(pub &'b [u8]);
@@ -158,6 +158,19 @@ impl Input<'_> {
         }
         ray.key = u32::from(self.byte());
         ray
+    }
+
+    /// Rays around one, with some that go elsewhere.
+    pub fn beam(&mut self, ray: &Ray) -> [Ray; RayPacket::LANES] {
+        let spread = 10f32.powi(-i32::from(self.byte() % 8));
+        let mut beam = [*ray; RayPacket::LANES];
+        for ray in &mut beam[1..] {
+            let mut part = || f32::from(self.byte().cast_signed()) / 128.0 * spread;
+            let [x, y, z] = [part(), part(), part()];
+            ray.direction += ray.direction.length() * Vec3::new(x, y, z);
+            ray.origin += Vec3::new(y, z, x) * ray.origin.length();
+        }
+        beam
     }
 
     /// A rectangle inside a map.

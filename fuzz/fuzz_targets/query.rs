@@ -10,7 +10,7 @@ use input::Input;
 use libfuzzer_sys::fuzz_target;
 use prismarch::bvh::BvhTracer;
 use prismarch::prism::{PrismHit, Prisms, SimdLevel};
-use prismarch::ray::Ray;
+use prismarch::ray::{Ray, RayPacket};
 use prismarch::surface::{DisplacedSurface, DisplacementMap, NormalMode};
 use prismarch::trace::{Object, Placement, Shape, Tracer, World};
 
@@ -64,6 +64,9 @@ fn run(input: &mut Input) -> Option<()> {
             let ray = input.ray();
             show(&ray);
             both.iter().for_each(|prisms| ask(prisms, &ray));
+            let beam = input.beam(&ray);
+            show(&beam);
+            both.iter().for_each(|prisms| ask_together(prisms, &beam));
             if let Some(tracer) = &tracer {
                 let hit = tracer.intersect(&ray);
                 assert_eq!(tracer.occluded(&ray), hit.is_some(), "{ray:?} {hit:?}");
@@ -105,6 +108,36 @@ fn ask(prisms: &Prisms, ray: &Ray) {
         assert_eq!(occluded, hit.is_some(), "{ray:?} {hit:?}");
         if let Some(PrismHit { prim, t, u, v, ng }) = hit {
             check(prisms, ray, prim, [t, u, v], ng);
+        }
+    }
+}
+
+/// Asks every primitive about eight rays at once: what they say of each is what they say of it alone.
+fn ask_together(prisms: &Prisms, rays: &[Ray; RayPacket::LANES]) {
+    let packet = RayPacket::from_rays(rays);
+    let valid = (0..).zip(rays).fold(0, |valid, (lane, ray)| {
+        valid | u8::from(ray.is_valid()) << lane
+    });
+    if valid == 0 {
+        return;
+    }
+    for primitive in 0..prisms.len() as u32 {
+        let hits = prisms.intersect8(primitive, &packet, valid);
+        let occluded = prisms.occluded8(primitive, &packet, valid);
+        for (lane, (hit, ray)) in hits.iter().zip(rays).enumerate() {
+            if valid >> lane & 1 == 0 {
+                continue;
+            }
+            assert_eq!(occluded >> lane & 1 != 0, hit.is_some(), "{ray:?} {hit:?}");
+            let alone = prisms.intersect(primitive, ray);
+            match (hit, alone) {
+                (&Some(PrismHit { prim, t, u, v, ng }), Some(alone)) => {
+                    check(prisms, ray, prim, [t, u, v], ng);
+                    let apart = (t - alone.t).abs();
+                    assert!(apart <= 1e-5 * t.abs(), "{ray:?} {hit:?} {alone:?}");
+                }
+                (hit, alone) => assert_eq!(*hit, alone, "{ray:?}"),
+            }
         }
     }
 }

@@ -108,8 +108,7 @@ impl<'a> Approach<'a> {
     #[inline(always)]
     fn meeting<'s, L: Lanes>(&'s self, cut: &CutArcs<L>, arcs: &'s Arcs, met: u32) -> Meeting<'s> {
         let found = cut.found(arcs, met, &self.ray.splat());
-        // Level of detail is decided on curves of f64.
-        let others = if self.ray.is_usual && self.prisms.spread() == 0.0 {
+        let others = if self.ray.is_usual {
             found.others | met & self.cluster.folded::<L>()
         } else {
             met

@@ -5,6 +5,7 @@
 //! texel line, in no order: it leaves at the next line. A lane in which |f| provably stays above what the chord may be
 //! off is done with; f64 looks at the others, in order.
 
+use super::lod;
 use super::signs::{Side, Signs};
 use super::span::Walker;
 use crate::prism::simd::{Grid, LANES, Lanes};
@@ -205,6 +206,20 @@ impl Chord {
             let certain = sure(f0) && sure(end) && (f0 > 0.0) != (end > 0.0);
             let (from, to) = (s(start), s(start + length));
             let root = s(start + length * root(f0, f1, f2));
+            // Where exactly in a cell that is smaller than half a footprint is not asked.
+            if certain
+                && walker.problem.spread > 0.0
+                && signs.comes_from(f0 > 0.0)
+                && lod::ends_in(
+                    walker,
+                    [from as f32, to as f32],
+                    root as f32,
+                    f0 > 0.0,
+                    signs,
+                )
+            {
+                return;
+            }
             if certain && let Some(times) = walker.surely_within(from as f32, to as f32) {
                 if signs.any_will_do() {
                     return signs.found_any();

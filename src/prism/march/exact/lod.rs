@@ -2,80 +2,88 @@
 //!
 //! Children of a span that are wholly above or below the surface say on which side the ray is at their ends. If the ray is above
 //! the surface before a run of other children and below it behind them, or the other way round, it crosses the surface in the run, and
-//! for the first time: all before was looked at. Where the run is short enough its middle is the hit, and no texel is read. So no ray
-//! is lost and none is caught, and what cannot be told so is walked as exactly as ever.
+//! for the first time: all before was looked at. Where the run is short enough and surely inside the prism its middle is the hit, and no
+//! texel is read. So no ray is lost and none is caught. What cannot be told so is walked as exactly as ever, but for where in its cell a
+//! crossing is that f32 is certain of.
 
+use super::Found;
 use super::children::{Ends, at};
 use super::signs::Signs;
-use super::{Found, Problem};
-use crate::prism::curve::{Curve, End, Stretch};
+use super::span::Walker;
 use crate::prism::simd::Quad;
 
-/// Whether the curve begins and ends above the surface, where a stretch begins or ends at the smallest or largest w of the prism: the whole
-/// surface is between those. `t` is the ray's parameter at both ends; what is before the ray's interval is not looked at, so that
-/// where that begins later, the beginning tells nothing.
+/// Whether an arc begins and ends above the surface, where it begins or ends at the smallest or largest w of the prism: the whole
+/// surface is between those. What is before the ray's interval is not looked at, so that where that begins later, the beginning tells
+/// nothing.
 #[inline(always)]
-pub fn caps<Q: Quad>(
-    problem: &Problem<'_>,
-    stretch: &Stretch,
-    curve: &Curve<Q>,
-    t: [f64; 2],
-) -> [Option<bool>; 2] {
+pub fn caps(walker: &Walker<'_>) -> [Option<bool>; 2] {
+    let problem = walker.problem;
+    let [low, high] = problem.cluster.offsets(problem.lane);
+    // The range of w is wider than the surface by more than this.
+    let off = low.abs().max(high.abs()) * f32::EPSILON;
     let high_is_above = problem.surface.displacement().scale > 0.0;
-    let side = |k: usize| match stretch.ends[k] {
-        End::Cap => Some((k == 1) == high_is_above),
-        End::Side(_) => None,
+    let side = |s: f32, w: f32| {
+        if !walker.is_inside(s, s) {
+            None
+        } else if w >= high - off {
+            Some(high_is_above)
+        } else if w <= low + off {
+            Some(!high_is_above)
+        } else {
+            None
+        }
     };
-    // The curve runs in the order of t, the stretch in that of w.
-    let [begin, end] = if curve.w[1] > 0.0 {
-        [side(0), side(1)]
-    } else {
-        [side(1), side(0)]
-    };
-    [begin.filter(|_| t[0] > f64::from(problem.interval[0])), end]
+    let [w0, w1] = walker.offsets();
+    let begin = side(0.0, w0).filter(|_| walker.times(0.0)[0] > f64::from(problem.interval[0]));
+    [begin, side(1.0, w1)]
 }
 
-/// The hit on a curve that goes through all of the surface's range, if it is short enough.
+/// Ends the search on an arc that goes through all of the surface's range, if it is short enough.
 #[inline(always)]
-pub fn through<Q: Quad>(
-    problem: &Problem<'_>,
-    curve: &Curve<Q>,
-    caps: [Option<bool>; 2],
-) -> Option<Found> {
-    match caps {
-        [Some(before), Some(behind)] if before != behind && problem.is_ordered() => {
-            middle(problem, curve, [0.0, 1.0], before)
+pub fn through<Q: Quad>(walker: &Walker<'_>, signs: &mut Signs<'_, Q>) -> bool {
+    match walker.caps {
+        [Some(before), Some(behind)] if before != behind => {
+            ends_in(walker, [0.0, 1.0], 0.5, before, signs)
         }
-        _ => None,
+        _ => false,
     }
 }
 
-/// The middle of a part of a curve that is known to cross the surface, coming from above or not, if that is as good as the crossing.
+/// Ends the search at a point of a part of an arc that is known to be crossed for the first time, coming from above or not, if that is as
+/// good as the crossing.
 #[inline(always)]
-fn middle<Q: Quad>(
-    problem: &Problem<'_>,
-    curve: &Curve<Q>,
-    [from, to]: [f64; 2],
+pub fn ends_in<Q: Quad>(
+    walker: &Walker<'_>,
+    [from, to]: [f32; 2],
+    point: f32,
     above: bool,
-) -> Option<Found> {
-    let ([start, ..], [end, ..]) = (curve.seen(from), curve.seen(to));
-    let [t, u, v] = curve.seen(0.5 * (from + to));
+    signs: &mut Signs<'_, Q>,
+) -> bool {
+    let problem = walker.problem;
+    let ([start, _], [_, end]) = (walker.times(from), walker.times(to));
+    let [low, high] = walker.times(point);
     let most = 0.5 * f64::from(problem.spread) * start;
-    let is_good = start > f64::from(problem.interval[0]) && (t - start).max(end - t) <= most;
-    is_good.then_some(Found {
-        t,
-        u,
-        v,
-        above,
-        ng: None,
-    })
+    let is_good = problem.is_ordered()
+        && start > f64::from(problem.interval[0])
+        && (high - start).max(end - low) <= most
+        && walker.is_inside(from, to);
+    if is_good {
+        let [u, v] = walker.uv(point);
+        signs.end_with(Found {
+            t: 0.5 * (low + high),
+            u,
+            v,
+            above,
+            ng: None,
+        });
+    }
+    is_good
 }
 
 /// Ends the search in the first run of children that may meet the surface, if that is short enough and crosses it; or says that it does not.
 #[inline(always)]
 pub fn settle<Q: Quad>(
-    problem: &Problem<'_>,
-    caps: [Option<bool>; 2],
+    walker: &Walker<'_>,
     ends: &Ends,
     alive: u32,
     span: [f32; 2],
@@ -84,7 +92,7 @@ pub fn settle<Q: Quad>(
     let apart = ends.above | ends.below;
     let first = apart.trailing_ones() as usize;
     // By the surface alone, not by the ray's interval: a hit must not depend on what was met before.
-    if first >= ends.children || alive >> first & 1 == 0 || !problem.is_ordered() {
+    if first >= ends.children || alive >> first & 1 == 0 {
         return false;
     }
     let last = first
@@ -93,30 +101,23 @@ pub fn settle<Q: Quad>(
             .min((ends.children - first) as u32) as usize;
     let is_above = |child: usize| ends.above >> child & 1 != 0;
     let before = match first {
-        // Nothing has been crossed since the last point, or since the curve began.
-        0 => signs.is_above().or(caps[0]),
+        // Nothing has been crossed since the last point, or since the arc began.
+        0 => signs.is_above().or(walker.caps[0]),
         _ => Some(is_above(first - 1)),
     };
     let behind = if last < ends.children {
         Some(is_above(last))
     } else if span[1] == 1.0 {
-        caps[1]
+        walker.caps[1]
     } else {
         None
     };
     let (Some(before), Some(behind)) = (before, behind) else {
         return false;
     };
-    if before == behind {
-        return false;
-    }
-    let from = f64::from(at(span, first, ends.children));
-    let to = f64::from(at(span, last, ends.children));
-    match middle(problem, &signs.curve(), [from, to], before) {
-        Some(found) => {
-            signs.end_with(found);
-            true
-        }
-        None => false,
-    }
+    let run = [
+        at(span, first, ends.children),
+        at(span, last, ends.children),
+    ];
+    before != behind && ends_in(walker, run, 0.5 * (run[0] + run[1]), before, signs)
 }

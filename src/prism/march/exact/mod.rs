@@ -192,7 +192,7 @@ fn edge_on<L: Lanes>(
     for &w in &heights[..count] {
         if let Some(part) = pieces::flat::<L::Quad>(&patch, frame, w) {
             let mut signs = Signs::new(problem, frame);
-            walk_curve::<L>(problem, &part, view, [None; 2], &mut signs);
+            walk_curve::<L>(problem, &part, view, &mut signs);
             nearest = nearer(nearest, signs.nearest());
         }
     }
@@ -224,16 +224,9 @@ fn along<L: Lanes>(
     {
         return None;
     }
-    let mut caps = [None; 2];
-    if problem.spread > 0.0 && curve.is_wide {
-        caps = lod::caps(problem, stretch, &curve, ends);
-        if let Some(found) = lod::through(problem, &curve, caps) {
-            return problem.accepts(found.t).then_some(found);
-        }
-    }
     if problem.cluster.is_short(problem.lane) && pieces::is_even(&curve) {
         let mut signs = Signs::new(problem, frame);
-        walk_curve::<L>(problem, &curve, view, caps, &mut signs);
+        walk_curve::<L>(problem, &curve, view, &mut signs);
         return signs.nearest();
     }
     L::outline(Uneven {
@@ -244,21 +237,18 @@ fn along<L: Lanes>(
     })
 }
 
-/// Walks a curve, or a piece of one. `caps` tells whether its ends are above the surface, where that is known.
+/// Walks a curve, or a piece of one.
 #[inline(always)]
 fn walk_curve<L: Lanes>(
     problem: &Problem<'_>,
     curve: &Curve<L::Quad>,
     view: &View<L::Quad>,
-    caps: [Option<bool>; 2],
     signs: &mut Signs<'_, L::Quad>,
 ) {
     let start = curve.ends()[0];
     let arcs = Arcs::of_curve::<L>(problem, curve, view, start);
     signs.set_curve(*curve);
-    let mut walker = Walker::new(problem, &arcs, 0, curve.texel_base, start);
-    walker.caps = caps;
-    walker.walk::<L>(signs);
+    Walker::new(problem, &arcs, 0, curve.texel_base, start).walk::<L>(signs);
 }
 
 /// As [`along`], where A changes so much that no one span can be bounded: piece by piece.
@@ -288,7 +278,7 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
                 Piece::Flat(w) => pieces::flat(&problem.patch(), frame, w),
             };
             if let Some(part) = part {
-                walk_curve::<L>(problem, &part, self.view, [None; 2], &mut signs);
+                walk_curve::<L>(problem, &part, self.view, &mut signs);
             }
             if signs.is_done() {
                 break;

@@ -69,6 +69,12 @@ impl<'a, Q: Quad> Signs<'a, Q> {
         self.above.is_none()
     }
 
+    /// Whether the last point, if there was one, was on this side.
+    #[inline(always)]
+    pub fn comes_from(&self, above: bool) -> bool {
+        self.above.is_none_or(|last| last == above)
+    }
+
     /// The side of the last point.
     #[inline(always)]
     pub fn is_above(&self) -> Option<bool> {
@@ -171,7 +177,7 @@ impl<'a, Q: Quad> Signs<'a, Q> {
     /// Ends the search at a crossing between two points whose sides are certain; `false` where signs must find it.
     #[inline(always)]
     pub fn land<L: Lanes<Quad = Q>>(&mut self, guess: &Guess) -> bool {
-        if !self.problem.is_ordered() || self.above.is_some_and(|above| above != guess.above) {
+        if !self.problem.is_ordered() || !self.comes_from(guess.above) {
             return false;
         }
         let Some(found) = L::outline(Landing { signs: self, guess }) else {

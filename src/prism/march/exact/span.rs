@@ -12,7 +12,7 @@ use super::arcs::Arcs;
 use super::cells::{Chord, MOST_CELLS, Off};
 use super::children::{Ends, Stack, at, of};
 use super::landing::Guess;
-use super::lod::settle;
+use super::lod;
 use super::signs::{Side, Signs};
 use crate::prism::simd::{Grid, LANES, Lanes, Quad, Task};
 
@@ -28,7 +28,7 @@ pub const SHORTEST: f32 = 16.0 * f32::EPSILON;
 /// One arc, ready to be walked.
 #[derive(Clone, Copy)]
 pub struct Walker<'a> {
-    problem: &'a Problem<'a>,
+    pub problem: &'a Problem<'a>,
     arcs: &'a Arcs,
     lane: usize,
     /// The arc's point of reference, from its texel base.
@@ -44,7 +44,7 @@ pub struct Walker<'a> {
     pub whole: [f32; 2],
     /// tnear and tfar from the arc's point of reference in time, narrowed by all doubt.
     surely: [f32; 2],
-    /// Whether the arc's ends are above the surface, where that is known.
+    /// Whether the arc's ends are above the surface, where level of detail asks and that is known.
     pub caps: [Option<bool>; 2],
 }
 
@@ -109,6 +109,9 @@ impl<'a> Walker<'a> {
         if problem.is_ordered() {
             walker.clip();
         }
+        if problem.spread > 0.0 {
+            walker.caps = lod::caps(&walker);
+        }
         walker
     }
 
@@ -127,16 +130,13 @@ impl<'a> Walker<'a> {
             near + rounding(tnear, near) + off,
             far - rounding(tfar, far) - off,
         ];
-        // Where level of detail ends a search must not depend on the ray's interval, and so on what was met before.
-        if self.problem.spread > 0.0 {
-            return;
-        }
         let near = near - near.abs() * f32::EPSILON - off;
         let far = far + far.abs() * f32::EPSILON + off;
         if begin < near {
             self.whole[0] = self.parameter(near, -1.0).unwrap_or(0.0);
         }
-        if end > far {
+        // Where level of detail ends a search must not depend on what was met before.
+        if end > far && self.problem.spread == 0.0 {
             self.whole[1] = self.parameter(far, 1.0).unwrap_or(1.0);
         }
     }
@@ -164,14 +164,27 @@ impl<'a> Walker<'a> {
         (c0[l] + s * (c1[l] + s * (c2[l] + s * c3[l]))) / (a0[l] + s * (a1[l] + s * a2[l]))
     }
 
-    /// The ray parameters at two parameters less than a chord apart, where all points between them are surely inside the prism and the
-    /// ray's interval.
+    /// The ray parameters between which the arc's point at s is.
     #[inline(always)]
-    pub fn surely_within(&self, from: f32, to: f32) -> Option<[f32; 2]> {
+    pub fn times(&self, s: f32) -> [f64; 2] {
+        let (t, off) = (self.time(s), self.arcs.time_off[self.lane]);
+        [f64::from(t - off), f64::from(t + off)].map(|t| self.time_base + t)
+    }
+
+    /// w at both ends of the arc.
+    #[inline(always)]
+    pub fn offsets(&self) -> [f32; 2] {
+        [self.arcs.w[0][self.lane], self.arcs.w[1][self.lane]]
+    }
+
+    /// Whether all points between two parameters are surely inside the prism.
+    #[inline(always)]
+    pub fn is_inside(&self, from: f32, to: f32) -> bool {
         let l = self.lane;
         let [u0, u1, u2] = &self.arcs.u;
         let [v0, v1, v2] = &self.arcs.v;
         let [a0, a1, a2] = &self.arcs.area;
+        // A quadratic is below its chord by no more than this.
         let least = |c0: f32, c1: f32, c2: f32| {
             let at = |s: f32| c0 + s * (c1 + s * c2);
             at(from).min(at(to)) - c2.abs() * (to - from) * (to - from)
@@ -184,26 +197,33 @@ impl<'a> Walker<'a> {
         let inside = least(u0[l], u1[l], u2[l])
             .min(least(v0[l], v1[l], v2[l]))
             .min(least(p0, p1, p2));
-        let area = (a0[l] + from * (a1[l] + from * a2[l])).abs();
+        let at = |s: f32| (a0[l] + s * (a1[l] + s * a2[l])).abs();
+        inside > 3.0 * self.arcs.inside_off[l] * at(from).max(at(to))
+    }
+
+    /// The ray parameters at two parameters, where all points between them are surely inside the prism and the ray's interval.
+    #[inline(always)]
+    pub fn surely_within(&self, from: f32, to: f32) -> Option<[f32; 2]> {
         let times = [self.time(from), self.time(to)];
-        (inside > 3.0 * self.arcs.inside_off[l] * area
-            && times[0] > self.surely[0]
-            && times[1] < self.surely[1])
+        (self.is_inside(from, to) && times[0] > self.surely[0] && times[1] < self.surely[1])
             .then_some(times)
+    }
+
+    /// Barycentrics of vertices 1 and 2 at s, about.
+    #[inline(always)]
+    pub fn uv(&self, s: f32) -> [f64; 2] {
+        let l = self.lane;
+        let at = |[c0, c1, c2]: &[[f32; LANES]; 3]| c0[l] + s * (c1[l] + s * c2[l]);
+        let area = at(&self.arcs.area);
+        [&self.arcs.u, &self.arcs.v].map(|c| f64::from(at(c) / area))
     }
 
     /// A crossing at s, between two ray parameters, that comes from above or not.
     #[inline(always)]
     pub fn guess(&self, s: f32, times: [f32; 2], above: bool) -> Guess {
-        let l = self.lane;
-        let at = |[c0, c1, c2]: &[[f32; LANES]; 3]| c0[l] + s * (c1[l] + s * c2[l]);
-        let area = at(&self.arcs.area);
-        let off = f64::from(self.arcs.time_off[l]);
+        let off = f64::from(self.arcs.time_off[self.lane]);
         Guess {
-            uv: [
-                f64::from(at(&self.arcs.u) / area),
-                f64::from(at(&self.arcs.v) / area),
-            ],
+            uv: self.uv(s),
             t: [
                 self.time_base + f64::from(times[0]) - off,
                 self.time_base + f64::from(times[1]) + off,
@@ -225,6 +245,9 @@ impl<'a> Walker<'a> {
     fn walk_here<L: Lanes>(&self, signs: &mut Signs<'_, L::Quad>) {
         signs.begin();
         signs.count_span();
+        if self.problem.spread > 0.0 && lod::through(self, signs) {
+            return;
+        }
         let (alive, ends) = self.children::<L>(self.whole);
         if alive == 0 || self.settles(&ends, alive, self.whole, signs) {
             return;
@@ -287,7 +310,7 @@ impl<'a> Walker<'a> {
         span: [f32; 2],
         signs: &mut Signs<'_, Q>,
     ) -> bool {
-        self.problem.spread > 0.0 && settle(self.problem, self.caps, ends, alive, span, signs)
+        self.problem.spread > 0.0 && lod::settle(self, ends, alive, span, signs)
     }
 
     /// How far the boxes of a span's children go beyond their ends, and the level of the pyramid whose blocks hold them.
