@@ -1,7 +1,7 @@
 //! Meshes, maps and rays from bytes. What the bytes do not say is zero.
 
 use glam::{Vec2, Vec3};
-use prismarch::prism::{EditBounds, March, PrismOptions, Step};
+use prismarch::prism::{EditBounds, Lod, March, PrismOptions, Step};
 use prismarch::ray::{Ray, RayPacket};
 use prismarch::surface::{Displacement, MeshBuilder, TexelRect, Texels, UvTransform, Wrap};
 
@@ -143,8 +143,13 @@ impl Input<'_> {
         PrismOptions {
             march,
             edit_bounds,
-            ..PrismOptions::default()
+            lod: [Lod::Off, Lod::Cone][usize::from(march == March::Exact && self.byte() % 2 == 1)],
         }
+    }
+
+    /// How fast cones grow: from a thousandth of a degree to half a sphere.
+    pub fn spread(&mut self) -> f32 {
+        3.0 * 10f32.powi(-i32::from(self.byte() % 6))
     }
 
     pub fn ray(&mut self) -> Ray {

@@ -45,12 +45,13 @@ fn run(input: &mut Input) -> Option<()> {
     let displacement = input.displacement();
     let surface = DisplacedSurface::new(Arc::new(mesh), map.clone(), displacement).ok()?;
     let surface = Arc::new(surface);
-    let options = input.options();
-    show(&(displacement, options));
+    let (options, spread) = (input.options(), input.spread());
+    show(&(displacement, options, spread));
 
     let mut both = Vec::new();
     for level in [SimdLevel::Baseline, SimdLevel::Avx2] {
         let prisms = Prisms::new(surface.clone(), options).ok()?;
+        prisms.set_spread(spread);
         both.extend(prisms.with_simd(level).map(Arc::new));
     }
     let world = World::new(vec![Object {

@@ -13,21 +13,19 @@ use super::span::Walker;
 use crate::prism::simd::Quad;
 
 /// Whether an arc begins and ends above the surface, where it begins or ends at the smallest or largest w of the prism: the whole
-/// surface is between those. What is before the ray's interval is not looked at, so that where that begins later, the beginning tells
+/// surface is between those, and an end that was rounded to beside them is none. What is before the ray's interval is not looked at, so that where that begins later, the beginning tells
 /// nothing.
 #[inline(always)]
 pub fn caps(walker: &Walker<'_>) -> [Option<bool>; 2] {
     let problem = walker.problem;
     let [low, high] = problem.cluster.offsets(problem.lane);
-    // The range of w is wider than the surface by more than this.
-    let off = low.abs().max(high.abs()) * f32::EPSILON;
     let high_is_above = problem.surface.displacement().scale > 0.0;
     let side = |s: f32, w: f32| {
         if !walker.is_inside(s, s) {
             None
-        } else if w >= high - off {
+        } else if w == high {
             Some(high_is_above)
-        } else if w <= low + off {
+        } else if w == low {
             Some(!high_is_above)
         } else {
             None

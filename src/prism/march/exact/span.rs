@@ -155,13 +155,19 @@ impl<'a> Walker<'a> {
         (s > 0.0 && s < 1.0 && (self.time(s) - t) * side >= 0.0).then_some(s)
     }
 
+    /// A quadratic of the arc's at s.
+    #[inline(always)]
+    fn value(&self, [c0, c1, c2]: &[[f32; LANES]; 3], s: f32) -> f32 {
+        let l = self.lane;
+        c0[l] + s * (c1[l] + s * c2[l])
+    }
+
     /// The ray parameter at s, from the arc's point of reference.
     #[inline(always)]
     fn time(&self, s: f32) -> f32 {
         let [c0, c1, c2, c3] = &self.arcs.time;
-        let [a0, a1, a2] = &self.arcs.area;
         let l = self.lane;
-        (c0[l] + s * (c1[l] + s * (c2[l] + s * c3[l]))) / (a0[l] + s * (a1[l] + s * a2[l]))
+        (c0[l] + s * (c1[l] + s * (c2[l] + s * c3[l]))) / self.value(&self.arcs.area, s)
     }
 
     /// The ray parameters between which the arc's point at s is.
@@ -197,8 +203,8 @@ impl<'a> Walker<'a> {
         let inside = least(u0[l], u1[l], u2[l])
             .min(least(v0[l], v1[l], v2[l]))
             .min(least(p0, p1, p2));
-        let at = |s: f32| (a0[l] + s * (a1[l] + s * a2[l])).abs();
-        inside > 3.0 * self.arcs.inside_off[l] * at(from).max(at(to))
+        let [begin, end] = [from, to].map(|s| self.value(&self.arcs.area, s).abs());
+        inside > 3.0 * self.arcs.inside_off[l] * begin.max(end)
     }
 
     /// The ray parameters at two parameters, where all points between them are surely inside the prism and the ray's interval.
@@ -212,10 +218,8 @@ impl<'a> Walker<'a> {
     /// Barycentrics of vertices 1 and 2 at s, about.
     #[inline(always)]
     pub fn uv(&self, s: f32) -> [f64; 2] {
-        let l = self.lane;
-        let at = |[c0, c1, c2]: &[[f32; LANES]; 3]| c0[l] + s * (c1[l] + s * c2[l]);
-        let area = at(&self.arcs.area);
-        [&self.arcs.u, &self.arcs.v].map(|c| f64::from(at(c) / area))
+        let area = self.value(&self.arcs.area, s);
+        [&self.arcs.u, &self.arcs.v].map(|c| f64::from(self.value(c, s) / area))
     }
 
     /// A crossing at s, between two ray parameters, that comes from above or not.
