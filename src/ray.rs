@@ -11,18 +11,20 @@ pub use packet::{RayPacket, lanes_of};
 /// A ray `origin + t * direction` for `t` in (`tnear`, `tfar`).
 ///
 /// `direction` need not be normalised: `t` is in units of its length, as Embree has it.
+// Word for word Embree's RTCRay but for its flags, so that a hit test reads it where Embree left it.
+#[repr(C, align(16))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start point, world units.
     pub origin: Vec3,
-    /// Direction, any non-zero length.
-    pub direction: Vec3,
     /// Start of the open parameter interval, at least 0.
     pub tnear: f32,
-    /// End of the open parameter interval; may be infinite.
-    pub tfar: f32,
+    /// Direction, any non-zero length.
+    pub direction: Vec3,
     /// 0 to 1, for what moves; beyond that it counts as the nearer end, and NaN as 0.
     pub time: f32,
+    /// End of the open parameter interval; may be infinite.
+    pub tfar: f32,
     /// A geometry is seen when `mask & geometry.mask != 0`.
     pub mask: u32,
     /// Random key of this ray: two rays with the same key march with the same thin-feature jitter.

@@ -339,6 +339,92 @@ fn where_normals_cancel_nothing_is_hit() {
     }
 }
 
+/// Where D is 0 the surface is there even where opposed normals cancel: the ray stays at one w and crosses it there. Hits have some normal.
+#[test]
+fn normals_where_vertex_normals_cancel() {
+    let mesh = mesh([
+        (Vec3::ZERO, Vec3::Z, vec2(0.0, 0.25)),
+        (Vec3::X, Vec3::Z, vec2(0.0, 0.25)),
+        (Vec3::Y, -Vec3::Z, vec2(0.0, 0.75)),
+    ]);
+    let map = DisplacementMap::new(1, 2, Texels::U8(vec![0, 255]), Wrap::Clamp).unwrap();
+    let scene = Scene::exact(mesh, map, 1.0, 0.5);
+    let rays: Vec<Ray> = (1..9)
+        .map(|k| {
+            let rise = 0.0625 * k as f32;
+            Ray::new(vec3(0.25, -0.5, -rise), vec3(0.0, 1.0, rise))
+        })
+        .collect();
+    for prisms in scene.prisms() {
+        assert!(hits(&prisms, &rays) > 0);
+    }
+}
+
+/// A surface that a huge displacement shrinks to a line has no normal: the uniform march hits nothing there.
+#[test]
+fn surfaces_shrunk_to_a_line() {
+    let tiny = -0.000_122_070_31;
+    let mesh = mesh([
+        (vec3(0.0, 0.0, tiny), Vec3::NEG_ONE, Vec2::splat(tiny)),
+        (
+            vec3(-2.949_096_7, 0.0, 0.0),
+            vec3(0.0, 0.0, -0.0),
+            Vec2::ZERO,
+        ),
+        (Vec3::ZERO, Vec3::ZERO, Vec2::ZERO),
+    ]);
+    let map = DisplacementMap::new(1, 1, Texels::U8(vec![0]), Wrap::Repeat).unwrap();
+    let mut scene = Scene::exact(mesh, map, 1e15, 1e15);
+    scene.options.march = March::Uniform {
+        step: Step::Texels(0.25),
+        jitter: false,
+    };
+    let ray = Ray {
+        tnear: 3.8125,
+        ..Ray::new(
+            vec3(-0.125_122_07, 1.913_696_3, 3.8125),
+            Vec3::splat(3.8125),
+        )
+    };
+    for prisms in scene.prisms() {
+        hits(&prisms, &[ray]);
+        let rect = TexelRect {
+            x: 0,
+            y: 0,
+            width: 1,
+            height: 1,
+        };
+        scene.map.update(rect, &Texels::U8(vec![26])).unwrap();
+        prisms.map_edited(rect);
+        hits(&prisms, &[ray]);
+    }
+}
+
+/// Directions whose length is 0 in single precision, to hits whose ray parameters are at the end of its range and beyond it.
+#[test]
+fn ray_parameters_beyond_single_precision() {
+    let mesh = mesh([
+        (Vec3::ZERO, Vec3::Z, Vec2::ZERO),
+        (Vec3::X, Vec3::Z, Vec2::X),
+        (Vec3::Y, Vec3::Z, Vec2::Y),
+    ]);
+    let texels = Texels::F32((0..64).map(|k| 0.01 * (k * 7 % 13) as f32).collect());
+    let map = DisplacementMap::new(8, 8, texels, Wrap::Repeat).unwrap();
+    let mut scene = Scene::exact(mesh, map, 1.0, 0.0);
+    let from = |height: f32| {
+        let direction = vec3(1e-41, 0.0, -1e-39);
+        Ray::new(vec3(0.2, 0.2, height), direction)
+    };
+    for lod in [Lod::Off, Lod::Cone] {
+        scene.options.lod = lod;
+        for prisms in scene.prisms() {
+            prisms.set_spread(0.003);
+            assert_eq!(hits(&prisms, &[from(0.3), from(0.25)]), 2);
+            assert_eq!(hits(&prisms, &[from(0.6), from(1.0)]), 0);
+        }
+    }
+}
+
 /// Edits of a map of which a triangle reads one point.
 #[test]
 fn boxes_hold_the_surface_after_edits() {

@@ -42,9 +42,10 @@ unsafe extern "C" fn on_filter(
     candidate: *const sys::pm_scene_hit,
 ) -> bool {
     // SAFETY: `user` is the FilterData given to `install`; the shim's pointers are valid during the call.
-    let (data, ray, candidate) = unsafe { (&*user.cast::<FilterData>(), &*ray, &*candidate) };
+    let (data, ray, candidate) =
+        unsafe { (&*user.cast::<FilterData>(), ray_from_raw(ray), &*candidate) };
     catch_unwind(AssertUnwindSafe(|| {
-        (data.filter)(&ray_from_raw(ray), &hit_from_raw(candidate))
+        (data.filter)(ray, &hit_from_raw(candidate))
     }))
     .unwrap_or_else(|payload| {
         data.faults.record_panic(&*payload);

@@ -213,8 +213,8 @@ impl<T: HitTest + 'static> Stored<T> {
         hit: *mut sys::pm_hit,
     ) -> bool {
         // SAFETY: `user` is the Stored<T> given with CALLBACKS; `ray` is valid during the call.
-        let (stored, ray) = unsafe { (&*user.cast::<Self>(), &*ray) };
-        let found = stored.caught(None, || stored.test.intersect(prim, &ray_from_raw(ray)));
+        let (stored, ray) = unsafe { (&*user.cast::<Self>(), ray_from_raw(ray)) };
+        let found = stored.caught(None, || stored.test.intersect(prim, ray));
         let Some(found) = found else { return false };
         // SAFETY: the shim's pointer is valid for a write.
         unsafe { hit.write(hit_to_raw(&found)) };
@@ -227,8 +227,8 @@ impl<T: HitTest + 'static> Stored<T> {
         ray: *const sys::pm_ray,
     ) -> bool {
         // SAFETY: as in `on_intersect`.
-        let (stored, ray) = unsafe { (&*user.cast::<Self>(), &*ray) };
-        stored.caught(false, || stored.test.occluded(prim, &ray_from_raw(ray)))
+        let (stored, ray) = unsafe { (&*user.cast::<Self>(), ray_from_raw(ray)) };
+        stored.caught(false, || stored.test.occluded(prim, ray))
     }
 
     /// A panic loses all lanes.
@@ -336,14 +336,22 @@ fn hit_to_raw(hit: &PrismHit) -> sys::pm_hit {
     }
 }
 
-pub(super) fn ray_from_raw(ray: &sys::pm_ray) -> Ray {
-    Ray {
-        origin: Vec3::from_array(ray.org),
-        direction: Vec3::from_array(ray.dir),
-        tnear: ray.tnear,
-        tfar: ray.tfar,
-        time: ray.time,
-        mask: ray.mask,
-        key: ray.id,
-    }
+// A ray is a `pm_ray` but for its flags, which are padding here: it is read where the shim has it.
+const _: () = assert!(
+    size_of::<Ray>() == size_of::<sys::pm_ray>()
+        && align_of::<Ray>() == align_of::<sys::pm_ray>()
+        && offset_of!(Ray, origin) == offset_of!(sys::pm_ray, org)
+        && offset_of!(Ray, tnear) == offset_of!(sys::pm_ray, tnear)
+        && offset_of!(Ray, direction) == offset_of!(sys::pm_ray, dir)
+        && offset_of!(Ray, time) == offset_of!(sys::pm_ray, time)
+        && offset_of!(Ray, tfar) == offset_of!(sys::pm_ray, tfar)
+        && offset_of!(Ray, mask) == offset_of!(sys::pm_ray, mask)
+        && offset_of!(Ray, key) == offset_of!(sys::pm_ray, id)
+);
+
+/// # Safety
+/// `ray` is valid for reads as long as the reference is used.
+pub(super) unsafe fn ray_from_raw<'r>(ray: *const sys::pm_ray) -> &'r Ray {
+    // SAFETY: the same layout, and any bits are numbers.
+    unsafe { &*ray.cast::<Ray>() }
 }

@@ -4,7 +4,7 @@ use super::cluster::{Cluster, MOST_PRISMS, groups};
 use super::detail::turned;
 use super::edits::EditBounds;
 use super::march::exact::{
-    Arcs, CutArcs, Found, FoundArcs, Problem, Search, Units, root, search_arc, walls,
+    Arcs, CutArcs, Found, FoundArcs, Problem, Search, Units, hit, search_arc, walls,
 };
 use super::ray_frame::{Anchored, RayFrame, axes};
 use super::sight::Sight;
@@ -191,7 +191,12 @@ impl Meeting<'_> {
 
 /// The first hit on a cluster.
 #[inline(always)]
-pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<PrismHit> {
+pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray, out: &mut PrismHit) -> bool {
+    out.put(first_hit::<L>(prisms, index, ray))
+}
+
+#[inline(always)]
+fn first_hit<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<PrismHit> {
     let approach = Approach::new(prisms, index, ray)?;
     let (sight, met) = approach.sight::<L>();
     if met == 0 {
@@ -238,13 +243,14 @@ pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<Pri
     }
     let (found, lane) = nearest?;
     let problem = meeting.problem(lane, interval, false);
-    let hit = root::<L>(&problem, &found).to_hit(cluster.prim(lane));
+    let hit = hit::<L>(&problem, &found);
     if problem.spread == 0.0 {
         return Some(hit);
     }
     // What is below the map's heights is inside, unless those go inward.
     let outside = found.above == (prisms.surface.displacement().scale > 0.0);
-    let along = ray.direction.normalize();
+    // In f64: the length of a tiny direction is 0 in f32.
+    let along = ray.direction.as_dvec3().normalize().as_vec3();
     let ng = turned(hit.ng, if outside { -along } else { along });
     Some(PrismHit { ng, ..hit })
 }

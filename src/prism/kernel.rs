@@ -9,7 +9,8 @@ use super::simd::{Portable, SimdLevel};
 use super::{March, PrismHit, Prisms, exact, packet, uniform};
 use crate::ray::{Ray, RayPacket, lanes_of};
 
-type Intersect = fn(&Prisms, u32, &Ray) -> Option<PrismHit>;
+/// Whether there is a hit, which is written to where the last argument says: most calls are misses, and these leave nothing in memory.
+type Intersect = fn(&Prisms, u32, &Ray, &mut PrismHit) -> bool;
 type Occluded = fn(&Prisms, u32, &Ray) -> bool;
 
 /// Of a packet: hits, and the lanes that are to be asked one by one.
@@ -52,7 +53,7 @@ macro_rules! stamped {
 macro_rules! single {
     ($level:expr, $march:ident) => {
         (
-            stamped!($level, $march::intersect(prisms: &Prisms, prim: u32, ray: &Ray) -> Option<PrismHit>),
+            stamped!($level, $march::intersect(prisms: &Prisms, prim: u32, ray: &Ray, out: &mut PrismHit) -> bool),
             stamped!($level, $march::occluded(prisms: &Prisms, prim: u32, ray: &Ray) -> bool),
         )
     };
@@ -112,7 +113,8 @@ impl Kernel {
 
     #[inline]
     pub fn intersect(&self, prisms: &Prisms, primitive: u32, ray: &Ray) -> Option<PrismHit> {
-        (self.intersect)(prisms, primitive, ray)
+        let mut hit = PrismHit::BLANK;
+        (self.intersect)(prisms, primitive, ray, &mut hit).then_some(hit)
     }
 
     #[inline]

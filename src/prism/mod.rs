@@ -69,6 +69,24 @@ pub struct PrismHit {
 }
 
 impl PrismHit {
+    /// What a hit is written over.
+    const BLANK: Self = Self {
+        prim: 0,
+        t: 0.0,
+        u: 0.0,
+        v: 0.0,
+        ng: Vec3::ZERO,
+    };
+
+    /// Writes a hit, if there is one, over `self`.
+    #[inline(always)]
+    fn put(&mut self, hit: Option<Self>) -> bool {
+        if let Some(hit) = hit {
+            *self = hit;
+        }
+        hit.is_some()
+    }
+
     /// Nearer, or at the same t on a primitive of a lower number.
     fn is_before(&self, other: &Self) -> bool {
         self.t < other.t || self.t == other.t && self.prim < other.prim

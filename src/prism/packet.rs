@@ -5,7 +5,7 @@
 //! lanes turned. The arcs through a prism are then walked side by side ([`search_arcs`]).
 
 use super::cluster::Cluster;
-use super::march::exact::{CutArcs, Found, Search, Units, root, search_arcs};
+use super::march::exact::{CutArcs, Found, Search, Units, hit, search_arcs};
 use super::ray_frame::{RayFrame, RayFrames, axes, share_axes};
 use super::sight::{Sight, met_by_beam};
 use super::simd::{LANES, Lanes};
@@ -32,10 +32,10 @@ pub fn intersect<L: Lanes>(
         return valid;
     };
     let looked_at = search::<L>(prisms, cluster, rays, valid, false, &mut nearest);
-    for (hit, nearest) in hits.iter_mut().zip(&nearest) {
+    for (out, nearest) in hits.iter_mut().zip(&nearest) {
         if let Some((found, lane)) = nearest {
             let problem = prisms.problem(cluster.1, *lane, [0.0; 2], false);
-            *hit = Some(root::<L>(&problem, found).to_hit(cluster.1.prim(*lane)));
+            *out = Some(hit::<L>(&problem, found));
         }
     }
     valid & !looked_at

@@ -44,8 +44,8 @@ impl UniformPrisms {
 
 /// The first hit over one base triangle.
 #[inline(always)]
-pub fn intersect<L: Lanes>(prisms: &Prisms, prim: u32, ray: &Ray) -> Option<PrismHit> {
-    first_root::<L>(prisms, prim, ray).map(|root| root.to_hit(prim))
+pub fn intersect<L: Lanes>(prisms: &Prisms, prim: u32, ray: &Ray, out: &mut PrismHit) -> bool {
+    out.put(first_root::<L>(prisms, prim, ray).map(|root| root.to_hit(prim)))
 }
 
 /// Whether there is any.

@@ -149,7 +149,8 @@ impl Patch<'_> {
     pub fn point_of(&self, sample: HeightSample, u: f64, v: f64) -> PatchPoint {
         let displacement = self.scale * (sample.height - self.midlevel);
         let raw_normal = self.normal(u, v);
-        let inverse_length = raw_normal.length_recip();
+        // Finite, so that where normals cancel S is on the base if D is 0.
+        let inverse_length = raw_normal.length_recip().min(f64::MAX);
         let normal = raw_normal * inverse_length;
         let tangent = |i: usize| {
             let dd = self.scale * sample.gradient.dot(self.texels[i] - self.texels[0]);

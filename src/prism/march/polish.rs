@@ -43,7 +43,7 @@ impl Root {
     }
 
     /// Whether the root is on its base triangle and the ray sees it. Neighbours overlap by a hair rather than
-    /// part by one. Where opposed normals cancel there is no N, and no surface.
+    /// part by one. Where opposed normals cancel, or the surface shrinks to a line, there is no normal, and no surface.
     pub fn is_hit(&self, ray: &Ray) -> bool {
         const OVERLAP: f64 = 1e-6;
         let t = self.t as f32;
@@ -52,7 +52,7 @@ impl Root {
             && self.u >= -OVERLAP
             && self.v >= -OVERLAP
             && self.u + self.v <= 1.0 + OVERLAP
-            && self.ng.is_finite()
+            && self.ng.try_normalize().is_some()
     }
 }
 

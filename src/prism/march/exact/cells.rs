@@ -69,10 +69,28 @@ impl Chord {
         walker: &Walker<'_>,
         signs: &mut Signs<'_, L::Quad>,
     ) {
+        let [[i0, j0], [i1, j1]] = self.cells;
+        let (nx, ny) = ((i1 - i0).abs(), (j1 - j0).abs());
+        if nx + ny < LANES as f32 {
+            self.walk_in::<L, 1>([nx, ny], grid, base, walker, signs);
+        } else {
+            self.walk_in::<L, BATCHES>([nx, ny], grid, base, walker, signs);
+        }
+    }
+
+    /// In so many batches: `[nx, ny]` are the lines of x and of y that are crossed.
+    #[inline(always)]
+    fn walk_in<L: Lanes, const R: usize>(
+        &self,
+        [nx, ny]: [f32; 2],
+        grid: &Grid<'_>,
+        base: [f32; 2],
+        walker: &Walker<'_>,
+        signs: &mut Signs<'_, L::Quad>,
+    ) {
         let [x0, y0, h0] = self.from;
         let [x1, y1, h1] = self.to;
         let [[i0, j0], [i1, j1]] = self.cells;
-        let (nx, ny) = ((i1 - i0).abs(), (j1 - j0).abs());
         let (dx, dy, dh) = (x1 - x0, y1 - y0, h1 - h0);
         // Positions relative to the first cell: few digits before the point.
         let (x0, y0) = (x0 - i0, y0 - j0);
@@ -90,22 +108,15 @@ impl Chord {
 
         let count = nx + ny + 1.0;
         let held = grid.holds([i0 + base[0], j0 + base[1]], [i1 + base[0], j1 + base[1]]);
-        let mut cells = Cells {
-            start: ZEROS,
-            length: ZEROS,
-            f: [ZEROS; 3],
-            off: ZEROS,
-        };
         let zero = L::splat(0.0);
         let one = L::splat(1.0);
         // The chord is off by as much, and a cell may be taken for its neighbour within `NUDGE`.
         let near = self.off.place + NUDGE;
         let mut steepest = zero;
-        for batch in 0..BATCHES {
+        let (mut starts, mut lengths, mut apart) = ([zero; R], [zero; R], [zero; R]);
+        let mut quadratics = [[zero; 3]; R];
+        for batch in 0..R {
             let first = (batch * LANES) as f32;
-            if first >= count {
-                break;
-            }
             let numbers = L::from_array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]) + L::splat(first);
             // Lanes 1 to nx: crossings of x lines; then ny crossings of y lines.
             let line_x = numbers.mul_add(L::splat(step_x), L::splat(ahead_x - step_x));
@@ -148,34 +159,37 @@ impl Chord {
             let end = (leaves - one).select_negative(end, apart_x.min(apart_y));
             let unused = L::splat(count - 0.5) - numbers;
             steepest = steepest.max(unused.select_negative(zero, slope));
-            cells.start[batch] = start.to_array();
-            cells.length[batch] = length.to_array();
-            cells.f[0][batch] = f[0].to_array();
-            cells.f[1][batch] = f[1].to_array();
-            cells.f[2][batch] = f[2].to_array();
-            cells.off[batch] = begin.min(end).to_array();
+            (starts[batch], lengths[batch]) = (start, length);
+            quadratics[batch] = f;
+            apart[batch] = begin.min(end);
         }
         // The curve is in a lane's cell, or in the next or last one, as far as it is from the chord. Where the chord passes a
         // corner closely it may touch cells of which no lane knows.
-        let off = steepest.max_lane() * near + self.off.height;
-        let wide = 2.0 * near * self.off.range + self.off.height;
+        let off = L::splat(steepest.max_lane() * near + self.off.height);
+        let wide = L::splat(2.0 * near * self.off.range + self.off.height);
         let mut possible = 0;
-        for batch in 0..BATCHES {
-            let first = (batch * LANES) as f32;
-            if first >= count {
-                break;
-            }
-            let f0 = L::from_array(cells.f[0][batch]);
-            let f1 = L::from_array(cells.f[1][batch]);
-            let f2 = L::from_array(cells.f[2][batch]);
-            let off = (L::from_array(cells.off[batch]) - L::splat(2.0 * near))
-                .select_negative(L::splat(wide), L::splat(off));
-            let used = ((1u64 << (count - first).min(LANES as f32) as u32) - 1) as u32;
-            possible |= (may_cross([f0, f1, f2], off) & used) << (batch * LANES);
-            cells.off[batch] = off.to_array();
+        let mut offs = apart;
+        for batch in 0..R {
+            offs[batch] = (apart[batch] - L::splat(2.0 * near)).select_negative(wide, off);
+            possible |= may_cross(quadratics[batch], offs[batch]) << (batch * LANES);
         }
+        possible &= ((1u64 << count as u32) - 1) as u32;
         if possible == 0 {
             return;
+        }
+        let mut cells = Cells {
+            start: ZEROS,
+            length: ZEROS,
+            f: [ZEROS; 3],
+            off: ZEROS,
+        };
+        for batch in 0..R {
+            cells.start[batch] = starts[batch].to_array();
+            cells.length[batch] = lengths[batch].to_array();
+            for (row, f) in cells.f.iter_mut().zip(quadratics[batch]) {
+                row[batch] = f.to_array();
+            }
+            cells.off[batch] = offs[batch].to_array();
         }
         self.report::<L>(possible, &cells, walker, signs);
     }

@@ -24,15 +24,19 @@ pub struct Guess {
 /// The hit near a guess, with its normal.
 #[inline(always)]
 pub fn land(patch: &Patch<'_>, frame: &RayFrame, guess: &Guess) -> Option<Found> {
-    const MOST_STEPS: usize = 5;
-    // Newton's error is about the square of its last step, so that nothing that single precision sees depends on the guess.
-    const FINE: f64 = 1e-8;
-    const FINE_TEXELS: f64 = 1e-7;
+    const MOST_STEPS: usize = 6;
+    // Barycentrics, and texels: where the normal is taken.
+    const FINE: f64 = 1e-9;
+    const FINE_TEXELS: f64 = 1e-8;
+    // What the last step, taken from there, may find missing: Newton's error is about the square of its step, so that nothing that
+    // single precision sees depends on the guess.
+    const BEYOND: f64 = 100.0;
     let ([x, y, z], [shear_x, shear_y]) = (frame.axes, frame.shear);
     let [a, b, c] = patch.texels;
     let texels = ((b - a).abs() + (c - a).abs()).max_element();
     let fine = FINE.min(FINE_TEXELS / texels);
     let [mut u, mut v] = guess.uv;
+    let (mut last_step, mut is_there) = (0.0, false);
     for _ in 0..MOST_STEPS {
         let point = patch.point(u, v);
         let (du, dv) = (point.du, point.dv);
@@ -45,18 +49,21 @@ pub fn land(patch: &Patch<'_>, frame: &RayFrame, guess: &Guess) -> Option<Found>
         let step_u = (miss_x * yv - miss_y * xv) * inverse;
         let step_v = (miss_y * xu - miss_x * yu) * inverse;
         (u, v) = (u + step_u, v + step_v);
-        if step_u.abs().max(step_v.abs()) <= fine {
-            let ng = patch.point(u, v).ng;
+        let step = step_u.abs().max(step_v.abs());
+        if is_there && step <= BEYOND * fine {
             let t = (depth + step_u * du[z] + step_v * dv[z]) * frame.per_depth;
-            let is_there = t >= guess.t[0] && t <= guess.t[1];
-            return is_there.then_some(Found {
+            let is_between = t >= guess.t[0] && t <= guess.t[1];
+            return is_between.then_some(Found {
                 t,
                 u,
                 v,
                 above: guess.above,
-                ng: Some(ng),
+                ng: Some(point.ng),
             });
         }
+        // What is left is to this step's square as this step is to the square of the last.
+        let left = step * (4.0 * (step / last_step).powi(2)).min(1.0);
+        (last_step, is_there) = (step, left <= fine);
     }
     None
 }

@@ -22,9 +22,10 @@ mod signs;
 mod span;
 mod walls;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::polish::Root;
+use crate::prism::PrismHit;
 use crate::prism::cluster::Cluster;
 use crate::prism::curve::{Curve, Cut, Stretch, View};
 use crate::prism::ray_frame::RayFrame;
@@ -110,7 +111,7 @@ pub fn search_arc<L: Lanes>(
     let mut signs = Signs::new(problem, frame);
     signs.set_arc([arcs.w[0][lane].into(), arcs.w[1][lane].into()]);
     let texel = problem.cluster.first_texel(lane, problem.surface.map());
-    Walker::new(problem, arcs, lane, texel.to_array(), time).walk::<L>(&mut signs);
+    Walker::new(problem, arcs, lane, texel.to_array(), time).walk_here::<L>(&mut signs);
     if signs.is_near_side() {
         return L::outline(Search { problem, frame });
     }
@@ -290,13 +291,17 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Uneven<'_, Q> {
 
 /// The hit on S at a crossing.
 #[inline(always)]
-pub fn root<L: Lanes>(problem: &Problem<'_>, found: &Found) -> Root {
+pub fn hit<L: Lanes>(problem: &Problem<'_>, found: &Found) -> PrismHit {
     let Found { t, u, v, ng, .. } = *found;
     let ng = match ng {
         Some(ng) => ng,
         None => L::outline(Normal { problem, found }),
     };
-    Root { t, u, v, ng }
+    let mut hit = Root { t, u, v, ng }.to_hit(problem.cluster.prim(problem.lane));
+    if hit.ng == Vec3::ZERO {
+        hit.ng = normal_without_surface(&problem.patch());
+    }
+    hit
 }
 
 struct Normal<'a> {
@@ -311,4 +316,17 @@ impl<L: Lanes> Task<L> for Normal<'_> {
     fn run(self) -> DVec3 {
         self.problem.patch().point(self.found.u, self.found.v).ng
     }
+}
+
+/// What stands for the normal where opposed vertex normals cancel, or the surface shrinks to a line: the base triangle's, and a
+/// vertex normal where that has no area.
+#[cold]
+fn normal_without_surface(patch: &Patch<'_>) -> Vec3 {
+    let face = patch.face_normal();
+    if face.is_finite() {
+        face
+    } else {
+        patch.normals[0]
+    }
+    .as_vec3()
 }

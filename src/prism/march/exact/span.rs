@@ -48,7 +48,7 @@ pub struct Walker<'a> {
     pub caps: [Option<bool>; 2],
 }
 
-/// [`Walker::walk`] in a function of its own: its callers are many, and it is long.
+/// [`Walker::walk`] in a function of its own.
 struct Walk<'w, 'a, 's, L: Lanes> {
     walker: &'w Walker<'a>,
     signs: &'w mut Signs<'s, L::Quad>,
@@ -123,12 +123,14 @@ impl<'a> Walker<'a> {
         let (begin, end) = (self.arcs.ends[0][self.lane], self.arcs.ends[1][self.lane]);
         let near = (f64::from(tnear) - self.time_base) as f32;
         let far = (f64::from(tfar) - self.time_base) as f32;
-        // Hits are compared in single precision; an infinite tfar stays what it is.
+        // Hits are compared in single precision, where what is beyond its range is no hit.
         let rounding =
-            |t: f32, from_there: f32| ((t.abs() + from_there.abs()) * f32::EPSILON).min(f32::MAX);
+            |t: f32, from_there: f32| t.abs() * f32::EPSILON + from_there.abs() * f32::EPSILON;
+        let last = tfar.min(f32::MAX);
+        let surely_far = ((f64::from(last) - self.time_base) as f32).min(f32::MAX);
         self.surely = [
             near + rounding(tnear, near) + off,
-            far - rounding(tfar, far) - off,
+            surely_far - rounding(last, surely_far) - off,
         ];
         let near = near - near.abs() * f32::EPSILON - off;
         let far = far + far.abs() * f32::EPSILON + off;
@@ -236,7 +238,7 @@ impl<'a> Walker<'a> {
         }
     }
 
-    /// Reports to `signs` every point of the arc at which the surface may be crossed, in order.
+    /// [`walk_here`](Self::walk_here) in a function of its own: it is long, and most callers are rare.
     #[inline(always)]
     pub fn walk<L: Lanes>(&self, signs: &mut Signs<'_, L::Quad>) {
         L::outline(Walk {
@@ -245,8 +247,9 @@ impl<'a> Walker<'a> {
         });
     }
 
+    /// Reports to `signs` every point of the arc at which the surface may be crossed, in order.
     #[inline(always)]
-    fn walk_here<L: Lanes>(&self, signs: &mut Signs<'_, L::Quad>) {
+    pub fn walk_here<L: Lanes>(&self, signs: &mut Signs<'_, L::Quad>) {
         signs.begin();
         signs.count_span();
         if self.problem.spread > 0.0 && lod::through(self, signs) {
