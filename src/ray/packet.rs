@@ -9,8 +9,8 @@ use super::{Ray, time_within};
 /// Eight rays, one per lane, in arrays that a vector register loads whole.
 ///
 /// A lane whose ray is not [valid](Ray::is_valid) is empty: it hits nothing. Rays of a packet may be answered faster
-/// than each alone when they go the same way from about the same place; the answers are the same, but for the last bit of a number in a few of a
-/// million hits on displaced surfaces.
+/// than each alone when they go the same way from about the same place; the answers are the same, but for the last bit of a number in some twenty
+/// of a million hits on displaced surfaces.
 // Word for word Embree's RTCRay8, so that packets pass through it as they are; `time` is private, for Embree takes no NaN, and `flags` its own.
 #[repr(C, align(32))]
 #[derive(Clone, Debug)]

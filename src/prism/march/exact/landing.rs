@@ -26,8 +26,8 @@ pub struct Guess {
 pub fn land(patch: &Patch<'_>, frame: &RayFrame, guess: &Guess) -> Option<Found> {
     const MOST_STEPS: usize = 6;
     // Barycentrics, and texels: where the normal is taken.
-    const FINE: f64 = 1e-9;
-    const FINE_TEXELS: f64 = 1e-8;
+    const FINE: f64 = 1e-11;
+    const FINE_TEXELS: f64 = 1e-10;
     // What the last step, taken from there, may find missing: Newton's error is about the square of its step, so that nothing that
     // single precision sees depends on the guess.
     const BEYOND: f64 = 100.0;
