@@ -48,7 +48,7 @@ pub struct Walker<'a> {
     pub caps: [Option<bool>; 2],
 }
 
-/// [`Walker::walk`] in a function of its own.
+/// [`Walker::walk_here`] in a function of its own.
 struct Walk<'w, 'a, 's, L: Lanes> {
     walker: &'w Walker<'a>,
     signs: &'w mut Signs<'s, L::Quad>,
