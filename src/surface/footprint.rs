@@ -229,8 +229,8 @@ impl<'m> Found<'m> {
             Meets::Partly => return true,
             Meets::Inside => {}
         }
-        // Entries reach over two blocks; across the map's edge only the finest are exact.
-        let reach = (2 * side) as f64;
+        // Across the map's edge only the finest entries are exact.
+        let reach = side as f64;
         let exact = level.shift() == self.map.pyramid().levels()[0].shift()
             || (low.x + reach < width as f64 && low.y + reach < height as f64);
         if exact && region.meets(low, low + reach) == Meets::Inside {

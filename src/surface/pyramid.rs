@@ -1,18 +1,17 @@
 //! The min/max pyramid over a displacement map: what a block of the map holds at least and at most.
 //!
 //! The finest blocks are 4x4 cells (cell (i, j) is the square between the centres of texels i, i+1 and j, j+1), those of
-//! the next level 8x8, and so on: B = 4, 8, 16, ... Entries are *dilated* over 2x2 blocks: entry (I, J) is the range of all
-//! texels of columns B I ..= B I + 2B and rows B J ..= B J + 2B. So **one entry covers any box of texel coordinates whose
-//! sides are at most B and whose lower left corner lies in block (I, J)**: a reader looks up one entry per box, not four. The
-//! undilated blocks are not stored.
+//! the next level 8x8, and so on: B = 4, 8, 16, ... Entry (I, J) is the range of all texels of columns B I ..= B I + B and rows
+//! B J ..= B J + B: all that bilinear interpolation reads in the block, edges included. So **any box of texel coordinates whose
+//! sides are at most B is covered by the four entries of the blocks that its corners lie in.**
 //!
 //! Columns and rows beyond the edge are those of the wrap mode: the first ones for repeat, the last one for clamp, the
-//! last ones backwards for mirror. A box is therefore looked up where its lower left corner is *after folding*: for
-//! repeat at the folded corner; for clamp at the clamped corner; for mirror at the corner of the box as it stands
-//! folded (where it was turned over, its other corner), and at 0 where it reaches below 0.
+//! last ones backwards for mirror. A box that begins at x *after folding* (for mirror, where the lower of its folded ends is; at
+//! 0 where it reaches below 0) and goes on for l ends in the block of x + l. Beyond the last block that is the first one
+//! for repeat, which the last one reaches up to; else the last.
 //!
-//! Levels go on until one entry is left; its block is at least as large as the map, so it covers everything whatever the
-//! anchor. Entries are exact but for coarser ones that reach across an edge where the map goes on out of step with the blocks
+//! Levels go on until one entry is left; its block is at least as large as the map, so it covers everything.
+//! Entries are exact but for coarser ones that reach across an edge where the map goes on out of step with the blocks
 //! (repeat: a side that is not a multiple of B; mirror): they hold less than one block too much.
 //!
 //! The pairs take 2/16 of the map's bytes on the finest level and 1/6 in all, at most 20 % for maps of at least
@@ -101,7 +100,7 @@ impl Level {
         self.height
     }
 
-    /// Smallest and largest texel of columns B i ..= B i + 2B and rows B j ..= B j + 2B, as stored: 0..=255, 0..=65535 or
+    /// Smallest and largest texel of columns B i ..= B i + B and rows B j ..= B j + B, as stored: 0..=255, 0..=65535 or
     /// heights (see [`DisplacementMap::unit`](super::DisplacementMap::unit)).
     ///
     /// # Panics

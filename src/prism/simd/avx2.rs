@@ -173,43 +173,45 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn block_ranges(level: &Level, i: Self, j: Self) -> [Self; 2] {
+    fn block_ranges(level: &Level, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
         // Moved inside here, as in `cell_corners`.
-        let last = [(level.width() - 1) as f32, (level.height() - 1) as f32];
-        let i = i.max(Self::splat(0.0)).min(Self::splat(last[0]));
-        let j = j.max(Self::splat(0.0)).min(Self::splat(last[1]));
-        // SAFETY: AVX2 is there. 0 <= i < width and 0 <= j < height, so index is that of a stored pair of the level.
+        let zero = Self::splat(0.0);
+        let last_i = Self::splat((level.width() - 1) as f32);
+        let last_j = Self::splat((level.height() - 1) as f32);
+        let i = [i[0].max(zero).min(last_i), i[1].max(zero).min(last_i)];
+        let j = [j[0].max(zero).min(last_j), j[1].max(zero).min(last_j)];
+        // SAFETY: AVX2 is there. 0 <= i < width and 0 <= j < height, so the four are stored pairs of the level.
         unsafe {
-            let stride = _mm256_set1_epi32(level.width() as i32);
-            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
-            let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
+            let width = _mm256_set1_epi32(level.width() as i32);
             let offset = _mm256_set1_epi32(level.offset() as i32);
-            entries(level.entries(), _mm256_add_epi32(index, offset))
+            of_blocks(level.entries(), i, j, width, offset)
         }
     }
 
     #[inline(always)]
-    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: Self, y: Self) -> [Self; 2] {
+    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: [Self; 2], y: [Self; 2]) -> [Self; 2] {
         let rows = grid.rows;
-        // SAFETY: AVX2 is there. The level is one of the pyramid's, and the block is moved inside it, so index is that of a
-        // stored pair: rows beyond the last level repeat it, and `max` gives 0 for NaN.
+        // SAFETY: AVX2 is there. The level is one of the pyramid's, and the blocks are moved inside it, so they are stored
+        // pairs: rows beyond the last level repeat it, and `max` gives 0 for NaN.
         unsafe {
             // The exponent of `size`, 1 for sizes from 2 to 4: the level is one less.
-            let zero = _mm256_setzero_si256();
             let exponent = _mm256_srli_epi32::<23>(_mm256_castps_si256(size.abs().0));
             let level = _mm256_sub_epi32(exponent, _mm256_set1_epi32(128));
             let last = _mm256_set1_epi32(rows.count as i32 - 1);
-            let level = _mm256_min_epi32(_mm256_max_epi32(level, zero), last);
+            let level = _mm256_min_epi32(_mm256_max_epi32(level, _mm256_setzero_si256()), last);
             let per_block = Self(looked_up(rows.per_block.as_ptr().cast(), level));
             let last_i = Self(looked_up(rows.last[0].as_ptr().cast(), level));
             let last_j = Self(looked_up(rows.last[1].as_ptr().cast(), level));
-            let i = (x * per_block).max(Self::splat(0.0)).min(last_i);
-            let j = (y * per_block).max(Self::splat(0.0)).min(last_j);
+            let zero = Self::splat(0.0);
+            let end_i = grid.within((x[1] * per_block).floor(), last_i);
+            let end_j = grid.within((y[1] * per_block).floor(), last_j);
+            let first_i = (x[0] * per_block).max(zero).min(last_i);
+            let first_j = (y[0] * per_block).max(zero).min(last_j);
+            let i = [first_i, end_i.max(zero).min(last_i)];
+            let j = [first_j, end_j.max(zero).min(last_j)];
             let width = _mm256_castps_si256(looked_up(rows.width.as_ptr().cast(), level));
             let offset = _mm256_castps_si256(looked_up(rows.offset.as_ptr().cast(), level));
-            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), width);
-            let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
-            entries(grid.levels[0].entries(), _mm256_add_epi32(index, offset))
+            of_blocks(grid.levels[0].entries(), i, j, width, offset)
         }
     }
 
@@ -275,28 +277,140 @@ unsafe fn looked_up(table: *const f32, index: __m256i) -> __m256 {
     }
 }
 
-/// The smallest and largest of stored pairs.
+/// The smallest and largest of four stored pairs: columns i and rows j of levels of some width that begin at `offset`.
+///
+/// # Safety
+///
+/// Needs AVX2, and columns and rows of stored pairs.
+#[inline(always)]
+unsafe fn of_blocks(
+    entries: &Entries,
+    i: [Avx2; 2],
+    j: [Avx2; 2],
+    width: __m256i,
+    offset: __m256i,
+) -> [Avx2; 2] {
+    // SAFETY: the caller's; loads of more than a pair end inside the pairs that `Entries` keeps after the last one. Edits
+    // meanwhile: as in `cell_corners`.
+    unsafe {
+        let (i0, i1) = (_mm256_cvttps_epi32(i[0].0), _mm256_cvttps_epi32(i[1].0));
+        let row0 = _mm256_mullo_epi32(_mm256_cvttps_epi32(j[0].0), width);
+        let row1 = _mm256_mullo_epi32(_mm256_cvttps_epi32(j[1].0), width);
+        let (row0, row1) = (
+            _mm256_add_epi32(row0, offset),
+            _mm256_add_epi32(row1, offset),
+        );
+        let (a, c) = (_mm256_add_epi32(row0, i0), _mm256_add_epi32(row1, i0));
+        let step = _mm256_sub_epi32(i1, i0);
+        let (b, d) = (_mm256_add_epi32(a, step), _mm256_add_epi32(c, step));
+        // 0 or 1, but for boxes across the edge of a map that repeats.
+        if _mm256_movemask_ps(_mm256_castsi256_ps(step)) != 0 {
+            return one_by_one(entries, [a, b, c, d]);
+        }
+        match entries {
+            Entries::U8(e) => {
+                // A pair and the next one in one load.
+                let pairs = e.as_ptr().cast();
+                let a = _mm256_i32gather_epi32::<2>(pairs, a);
+                let c = _mm256_i32gather_epi32::<2>(pairs, c);
+                let (low, high) = (_mm256_min_epu8(a, c), _mm256_max_epu8(a, c));
+                let bits = _mm256_slli_epi32::<4>(step);
+                let low = _mm256_min_epu8(low, _mm256_srlv_epi32(low, bits));
+                let high = _mm256_max_epu8(high, _mm256_srlv_epi32(high, bits));
+                [pair::<8>(low).0, pair::<8>(high).1]
+            }
+            Entries::U16(e) => {
+                let (a, c) = (neighbours(e, a), neighbours(e, c));
+                let low = [_mm256_min_epu16(a[0], c[0]), _mm256_min_epu16(a[1], c[1])];
+                let high = [_mm256_max_epu16(a[0], c[0]), _mm256_max_epu16(a[1], c[1])];
+                let ((low, next_low), (high, next_high)) = (unzipped(low), unzipped(high));
+                let is_next = Avx2(_mm256_castsi256_ps(_mm256_slli_epi32::<31>(step)));
+                let next_low = _mm256_castps_si256(is_next.select_negative(next_low, low).0);
+                let next_high = _mm256_castps_si256(is_next.select_negative(next_high, high).0);
+                let low = _mm256_min_epu16(_mm256_castps_si256(low.0), next_low);
+                let high = _mm256_max_epu16(_mm256_castps_si256(high.0), next_high);
+                [pair::<16>(low).0, pair::<16>(high).1]
+            }
+            Entries::F32(e) => {
+                let (low, high) = (e.as_ptr().cast::<f32>(), e.as_ptr().cast::<f32>().add(1));
+                let [a_low, b_low] = [
+                    Avx2(_mm256_i32gather_ps::<8>(low, a)),
+                    Avx2(_mm256_i32gather_ps::<8>(low, b)),
+                ];
+                let [c_low, d_low] = [
+                    Avx2(_mm256_i32gather_ps::<8>(low, c)),
+                    Avx2(_mm256_i32gather_ps::<8>(low, d)),
+                ];
+                let [a_high, b_high] = [
+                    Avx2(_mm256_i32gather_ps::<8>(high, a)),
+                    Avx2(_mm256_i32gather_ps::<8>(high, b)),
+                ];
+                let [c_high, d_high] = [
+                    Avx2(_mm256_i32gather_ps::<8>(high, c)),
+                    Avx2(_mm256_i32gather_ps::<8>(high, d)),
+                ];
+                [
+                    a_low.min(b_low).min(c_low.min(d_low)),
+                    a_high.max(b_high).max(c_high.max(d_high)),
+                ]
+            }
+        }
+    }
+}
+
+/// [`of_blocks`] for boxes across the edge of a map that repeats, which are few.
+///
+/// # Safety
+///
+/// Needs AVX2.
+#[inline(never)]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn one_by_one(entries: &Entries, index: [__m256i; 4]) -> [Avx2; 2] {
+    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    for index in index {
+        let mut numbers = [0i32; LANES];
+        // SAFETY: AVX is there; an unaligned store of 8 words into an array of 8.
+        unsafe { _mm256_storeu_si256(numbers.as_mut_ptr().cast(), index) };
+        for (l, number) in numbers.into_iter().enumerate() {
+            let (a, b) = entries.get(number as usize);
+            (low[l], high[l]) = (low[l].min(a), high[l].max(b));
+        }
+    }
+    [Avx2::from_array(low), Avx2::from_array(high)]
+}
+
+/// Stored 32-bit pairs, and behind each the next one: those of lanes 0, 1, 4, 5, and of the others.
 ///
 /// # Safety
 ///
 /// Needs AVX2, and numbers of stored pairs.
 #[inline(always)]
-unsafe fn entries(entries: &Entries, index: __m256i) -> [Avx2; 2] {
-    // SAFETY: the caller's; the 32-bit loads of 16-bit pairs end inside the pairs that `Entries` keeps after the last one. Edits
-    // meanwhile: as in `cell_corners`.
+unsafe fn neighbours(pairs: &[AtomicU32], index: __m256i) -> [__m256i; 2] {
+    let pairs = pairs.as_ptr().cast::<i64>();
+    // SAFETY: the caller's; as in `of_blocks`.
     unsafe {
-        let (low, high) = match entries {
-            Entries::U8(e) => pair::<8>(_mm256_i32gather_epi32::<2>(e.as_ptr().cast(), index)),
-            Entries::U16(e) => pair::<16>(_mm256_i32gather_epi32::<4>(e.as_ptr().cast(), index)),
-            Entries::F32(e) => {
-                let low = e.as_ptr().cast::<f32>();
-                (
-                    Avx2(_mm256_i32gather_ps::<8>(low, index)),
-                    Avx2(_mm256_i32gather_ps::<8>(low.add(1), index)),
-                )
-            }
-        };
-        [low, high]
+        let index = _mm256_permute4x64_epi64::<0b11_01_10_00>(index);
+        [
+            _mm256_i32gather_epi64::<4>(pairs, _mm256_castsi256_si128(index)),
+            _mm256_i32gather_epi64::<4>(pairs, _mm256_extracti128_si256::<1>(index)),
+        ]
+    }
+}
+
+/// The first and the second halves of [`neighbours`], in the order of lanes.
+///
+/// # Safety
+///
+/// Needs AVX2.
+#[inline(always)]
+unsafe fn unzipped([a, b]: [__m256i; 2]) -> (Avx2, Avx2) {
+    // SAFETY: the caller has AVX2.
+    unsafe {
+        let (a, b) = (_mm256_castsi256_ps(a), _mm256_castsi256_ps(b));
+        (
+            Avx2(_mm256_shuffle_ps::<0b10_00_10_00>(a, b)),
+            Avx2(_mm256_shuffle_ps::<0b11_01_11_01>(a, b)),
+        )
     }
 }
 

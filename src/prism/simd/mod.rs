@@ -112,12 +112,12 @@ pub(crate) trait Lanes:
     fn max_lane(self) -> f32;
     /// Bit k: lane k's sign bit.
     fn sign_mask(self) -> u32;
-    /// Smallest and largest stored texel of the blocks (i, j) of a level, integers in float lanes. Blocks outside the
-    /// level, and NaN, are moved inside first.
-    fn block_ranges(level: &Level, i: Self, j: Self) -> [Self; 2];
-    /// The same around boxes whose lower left corners are at (x, y), each on the finest level whose blocks are larger than `size`. Sizes
-    /// and corners are from 0 to 2^24; others are moved there.
-    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: Self, y: Self) -> [Self; 2];
+    /// Smallest and largest stored texel of four blocks of a level in columns i and rows j, integers in float lanes. The second column
+    /// is the first, the next, or one before. Blocks outside the level, and NaN, are moved inside first.
+    fn block_ranges(level: &Level, i: [Self; 2], j: [Self; 2]) -> [Self; 2];
+    /// The same of the blocks in which boxes from (x, y) to (x, y), folded at their low end only, begin and end, each on the finest
+    /// level whose blocks are larger than `size`. Sizes and corners are from 0 to 2^24; others are moved there.
+    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: [Self; 2], y: [Self; 2]) -> [Self; 2];
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), integers in float lanes.
     /// Cells outside the grid, and NaN, are moved inside first.
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4];
@@ -190,27 +190,44 @@ impl<'m> Grid<'m> {
     pub fn block_range<L: Lanes>(&self, level: usize, x: [L; 2], y: [L; 2]) -> [L; 2] {
         let level = &self.levels[level];
         let per_block = L::splat(1.0 / (1u32 << level.shift()) as f32);
-        let i = (self.first(x, self.size[0]) * per_block).floor();
-        let j = (self.first(y, self.size[1]) * per_block).floor();
-        L::block_ranges(level, i, j)
+        let (x, y) = (self.folded(x, self.size[0]), self.folded(y, self.size[1]));
+        let last = [level.width(), level.height()].map(|blocks| (blocks - 1) as f32);
+        let end_i = self.within((x[1] * per_block).floor(), L::splat(last[0]));
+        let end_j = self.within((y[1] * per_block).floor(), L::splat(last[1]));
+        let first_i = (x[0] * per_block).floor();
+        let first_j = (y[0] * per_block).floor();
+        L::block_ranges(level, [first_i, end_i], [first_j, end_j])
     }
 
     /// The same where every lane has its own size of box.
     #[inline(always)]
     pub fn block_ranges<L: Lanes>(&self, size: L, x: [L; 2], y: [L; 2]) -> [L; 2] {
-        let x = self.first(x, self.size[0]);
-        let y = self.first(y, self.size[1]);
+        let x = self.folded(x, self.size[0]);
+        let y = self.folded(y, self.size[1]);
         L::block_ranges_by_size(self, size, x, y)
     }
 
-    /// The smallest folded coordinate of a box, or one in the same block.
+    /// The smallest folded coordinate of a box, or one in the same block, and where the box ends, which may be beyond the edge.
     #[inline(always)]
-    fn first<L: Lanes>(&self, [low, high]: [L; 2], n: f32) -> L {
-        let low = self.fold(low, n);
+    fn folded<L: Lanes>(&self, [low, high]: [L; 2], n: f32) -> [L; 2] {
+        let first = self.fold(low, n);
         match self.wrap {
+            Wrap::Repeat => [first, first + (high - low)],
+            Wrap::Clamp => [first, self.fold(high, n)],
             // Of a box that is folded back on itself the fold is within a block of the border.
-            Wrap::Mirror => low.min(self.fold(high, n)),
-            Wrap::Repeat | Wrap::Clamp => low,
+            Wrap::Mirror => {
+                let first = first.min(self.fold(high, n));
+                [first, first + (high - low)]
+            }
+        }
+    }
+
+    /// The block in which a box ends: beyond the last there is the first again, or the last.
+    #[inline(always)]
+    fn within<L: Lanes>(&self, block: L, last: L) -> L {
+        match self.wrap {
+            Wrap::Repeat => (last - block).select_negative(L::splat(0.0), block),
+            Wrap::Clamp | Wrap::Mirror => block.min(last),
         }
     }
 
@@ -340,6 +357,19 @@ mod tests {
         maps
     }
 
+    /// Of several levels, and of sides that no block divides.
+    fn larger_maps() -> impl Iterator<Item = DisplacementMap> {
+        let sizes = [(37, 64), (64, 50), (9, 33)];
+        let all = sizes.map(|(w, h)| {
+            [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror].map(|wrap| {
+                let texel = |i: usize| ((i * 2654435761) >> 7) as u16;
+                let texels = Texels::U16((0..w * h).map(texel).collect());
+                DisplacementMap::new(w, h, texels, wrap).unwrap()
+            })
+        });
+        all.into_iter().flatten()
+    }
+
     fn samples_like_the_map<L: Lanes>() {
         for map in maps() {
             let grid = Grid::new(&map);
@@ -384,6 +414,47 @@ mod tests {
                         [one[0][l], one[1][l]],
                         "{level}"
                     );
+                }
+            }
+        }
+    }
+
+    fn four_blocks_hold_a_box<L: Lanes>() {
+        let mut state = 1u64;
+        let mut number = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
+            (state >> 40) as f32 / (1u64 << 24) as f32
+        };
+        for map in maps().into_iter().chain(larger_maps()) {
+            let grid = Grid::new(&map);
+            for _ in 0..300 {
+                let size = 40.0 * number() * number();
+                let mut along = |n: f32| {
+                    let low: [f32; LANES] = std::array::from_fn(|_| 3.0 * n * (number() - 0.5));
+                    let high = low.map(|low| low + size * number());
+                    [low, high]
+                };
+                let (x, y) = (along(grid.size[0]), along(grid.size[1]));
+                let lanes = [x, y].map(|box_| box_.map(L::from_array));
+                let level = grid.level(size + 0.01);
+                let found = grid.block_range(level, lanes[0], lanes[1]);
+                let [low, high] = found.map(|h| h.to_array().map(|h| h / grid.unit()));
+                for l in 0..LANES {
+                    for _ in 0..20 {
+                        let at = |[low, high]: &[[f32; LANES]; 2], part: f32| {
+                            f64::from(low[l]) + f64::from(high[l] - low[l]) * f64::from(part)
+                        };
+                        let place = DVec2::new(at(&x, number()), at(&y, number()));
+                        let height = map.sample(place).height as f32;
+                        let off = 1e-4 * height.abs().max(1.0);
+                        assert!(
+                            height >= low[l] - off && height <= high[l] + off,
+                            "{:?} level {level} {place} {height} {} {}",
+                            map.wrap(),
+                            low[l],
+                            high[l]
+                        );
+                    }
                 }
             }
         }
@@ -442,6 +513,7 @@ mod tests {
         moves_lanes::<Portable>();
         samples_like_the_map::<Portable>();
         finds_every_lanes_level::<Portable>();
+        four_blocks_hold_a_box::<Portable>();
         survives_any_coordinate::<Portable>();
     }
 
@@ -452,6 +524,7 @@ mod tests {
             moves_lanes::<Avx2>();
             samples_like_the_map::<Avx2>();
             finds_every_lanes_level::<Avx2>();
+            four_blocks_hold_a_box::<Avx2>();
             survives_any_coordinate::<Avx2>();
         }
     }

@@ -136,35 +136,37 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     }
 
     #[inline(always)]
-    fn block_ranges(level: &Level, i: Self, j: Self) -> [Self; 2] {
+    fn block_ranges(level: &Level, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
         if COUNTED {
             steps::count();
         }
-        let (i, j) = (i.to_array(), j.to_array());
-        let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
-        for l in 0..LANES {
-            // `as usize` turns NaN and negatives into 0.
-            let i = (i[l] as usize).min(level.width() - 1);
-            let j = (j[l] as usize).min(level.height() - 1);
-            (low[l], high[l]) = level.get(i, j);
-        }
-        [Self::from_array(low), Self::from_array(high)]
+        let (i, j) = (i.map(Self::to_array), j.map(Self::to_array));
+        of_blocks(|l| (level, i.map(|i| i[l]), j.map(|j| j[l])))
     }
 
     #[inline(always)]
-    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: Self, y: Self) -> [Self; 2] {
+    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: [Self; 2], y: [Self; 2]) -> [Self; 2] {
         if COUNTED {
             steps::count();
         }
-        let (size, x, y) = (size.to_array(), x.to_array(), y.to_array());
-        let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
-        for l in 0..LANES {
-            let level = &grid.levels[grid.level(size[l])];
-            let i = (x[l] as usize >> level.shift()).min(level.width() - 1);
-            let j = (y[l] as usize >> level.shift()).min(level.height() - 1);
-            (low[l], high[l]) = level.get(i, j);
-        }
-        [Self::from_array(low), Self::from_array(high)]
+        let size = size.to_array();
+        let level = |l: usize| &grid.levels[grid.level(size[l])];
+        let row = |value: &dyn Fn(&Level) -> f32| {
+            Self::from_array(std::array::from_fn(|l| value(level(l))))
+        };
+        let per_block = row(&|level| 1.0 / (1u32 << level.shift()) as f32);
+        let [first, end] = x.map(|x| (x * per_block).floor());
+        let i = [
+            first,
+            grid.within(end, row(&|level| (level.width() - 1) as f32)),
+        ];
+        let [first, end] = y.map(|y| (y * per_block).floor());
+        let j = [
+            first,
+            grid.within(end, row(&|level| (level.height() - 1) as f32)),
+        ];
+        let (i, j) = (i.map(Self::to_array), j.map(Self::to_array));
+        of_blocks(|l| (level(l), i.map(|i| i[l]), j.map(|j| j[l])))
     }
 
     #[inline(always)]
@@ -180,6 +182,26 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
         };
         corners.map(Self::from_array)
     }
+}
+
+/// The range of four blocks for each lane.
+#[inline(always)]
+fn of_blocks<'a, const COUNTED: bool>(
+    blocks: impl Fn(usize) -> (&'a Level, [f32; 2], [f32; 2]),
+) -> [Portable<COUNTED>; 2] {
+    let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        let (level, i, j) = blocks(l);
+        // `as usize` turns NaN and negatives into 0.
+        let i = i.map(|i| (i as usize).min(level.width() - 1));
+        let j = j.map(|j| (j as usize).min(level.height() - 1));
+        let ranges = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(a, b)| level.get(i[a], j[b]));
+        (low[l], high[l]) = ranges[0];
+        for (a, b) in &ranges[1..] {
+            (low[l], high[l]) = (low[l].min(*a), high[l].max(*b));
+        }
+    }
+    [low, high].map(Portable::from_array)
 }
 
 #[inline(always)]

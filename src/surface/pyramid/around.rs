@@ -1,5 +1,7 @@
 //! The range of heights in a box of texel coordinates, in a few look-ups.
 
+use std::ops::RangeInclusive;
+
 use glam::DVec2;
 
 use crate::surface::{DisplacementMap, Wrap};
@@ -12,7 +14,7 @@ const SMALL: f64 = 2.0;
 
 impl DisplacementMap {
     /// Smallest and largest height that samples in the box from `low` to `high` (texel coordinates) can have; of a box of more than
-    /// [`SMALL`] texels that of blocks around it, which reach less than the box's longest side too far.
+    /// [`SMALL`] texels that of blocks around it, which reach less than the box's longest side, or that of a finest block, too far.
     pub(crate) fn range_in_box(&self, low: DVec2, high: DVec2) -> (f32, f32) {
         let (low, high) = (low - SLACK, high + SLACK);
         let side = (high - low).max_element();
@@ -37,7 +39,7 @@ impl DisplacementMap {
         range
     }
 
-    /// Four entries, each for a quarter of the box with sides up to `side`.
+    /// The blocks of at least `side` that the box meets.
     fn range_of_blocks(&self, low: DVec2, high: DVec2, side: f64) -> (f32, f32) {
         let levels = self.pyramid.levels();
         let finest = levels[0].shift();
@@ -48,18 +50,19 @@ impl DisplacementMap {
         };
         let level = &levels[(wanted.saturating_sub(finest) as usize).min(levels.len() - 1)];
         let (width, height) = self.size();
-        let middle = 0.5 * (low + high);
-        let block = |low: f64, high: f64, n: usize, blocks: usize| {
-            let first = anchor(self.wrap(), low, high, n as f64);
-            (first as usize >> level.shift()).min(blocks - 1)
+        let blocks = |low: f64, high: f64, n: usize, count: usize| {
+            images(self.wrap(), low, high, n as f64).map(|image| {
+                image.map(|[a, b]| -> RangeInclusive<usize> {
+                    let [a, b] = [a, b].map(|x| (x as usize >> level.shift()).min(count - 1));
+                    a..=b
+                })
+            })
         };
-        let columns = [(low.x, middle.x), (middle.x, high.x)];
-        let rows = [(low.y, middle.y), (middle.y, high.y)];
-        let is = columns.map(|(a, b)| block(a, b, width, level.width()));
-        let js = rows.map(|(a, b)| block(a, b, height, level.height()));
+        let columns = blocks(low.x, high.x, width, level.width());
+        let rows = blocks(low.y, high.y, height, level.height());
         let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-        for j in js {
-            for i in is {
+        for j in rows.into_iter().flatten().flatten() {
+            for i in columns.iter().flatten().cloned().flatten() {
                 let (low, high) = level.get(i, j);
                 range = (range.0.min(low), range.1.max(high));
             }
@@ -68,18 +71,24 @@ impl DisplacementMap {
     }
 }
 
-/// Where the entry is looked up that holds low..=high: see the [room's text](super).
-fn anchor(wrap: Wrap, low: f64, high: f64, n: f64) -> f64 {
-    let (first, turned) = wrap.fold(low, n);
+/// The one or two parts of a side of n texels, [0, n], that low..=high folds onto.
+fn images(wrap: Wrap, low: f64, high: f64, n: f64) -> [Option<[f64; 2]>; 2] {
+    let ((first, before), (last, behind)) = (wrap.fold(low, n), wrap.fold(high, n));
+    let length = high - low;
+    let all = [0.0, n];
     match wrap {
-        Wrap::Repeat | Wrap::Clamp => first,
+        Wrap::Clamp => [Some([first, last]), None],
+        // Not even a number of the side's own.
+        _ if length >= n || length.is_nan() => [Some(all), None],
+        Wrap::Repeat if first + length <= n => [Some([first, first + length]), None],
+        Wrap::Repeat => [Some([first, n]), Some([0.0, first + length - n])],
+        // Turned over at one of the edges, or at none.
         Wrap::Mirror => {
-            let (last, straight) = wrap.fold(high, n);
-            if turned < 0.0 && straight > 0.0 {
-                0.0
-            } else {
-                first.min(last)
-            }
+            let low_edge = before < 0.0 && behind > 0.0;
+            let high_edge = before > 0.0 && behind < 0.0;
+            let low = if low_edge { 0.0 } else { first.min(last) };
+            let high = if high_edge { n } else { first.max(last) };
+            [Some([low, high]), None]
         }
     }
 }

@@ -32,16 +32,16 @@ impl Axis {
         1 << self.shift
     }
 
-    /// The entries of this level whose union covers entry `i` of the next: unfolded [2Bi, 2Bi + 4B] is
-    /// [2Bi, 2Bi + 2B], which is entry 2i, and [2Bi + 2B, 2Bi + 4B], which is entry 2i + 2 where there is one. Only
-    /// the last `i` has none; what is beyond the edge is then the folded map. A repeat is cut at the same places only
+    /// The entries of this level whose union covers entry `i` of the next: unfolded [2Bi, 2Bi + 2B] is
+    /// [2Bi, 2Bi + B], which is entry 2i, and [2Bi + B, 2Bi + 2B], which is entry 2i + 1 where there is one. Only
+    /// the last `i` may have none; what is beyond the edge is then the folded map. A repeat is cut at the same places only
     /// if n is a multiple of B, a mirrored map never (texel n - 1 comes twice); else two entries are needed, which reach
     /// less than B too far.
     pub fn parts(self, i: usize) -> Parts {
         let (b, n) = (self.side(), self.texels);
-        let start = 2 * b * (i + 1);
+        let start = b * (2 * i + 1);
         if start < n {
-            return Parts::new(2 * i, [2 * i + 2; 2]);
+            return Parts::new(2 * i, [2 * i + 1; 2]);
         }
         if self.blocks() == 1 {
             return Parts::new(0, [0; 2]); // covers the whole side
@@ -49,30 +49,26 @@ impl Axis {
         let beyond = match self.wrap {
             // Only the last texel, which entry 2i has.
             Wrap::Clamp => [2 * i; 2],
-            // From s = start - n on: the first block that meets s, and the one that meets s + B.
-            Wrap::Repeat => {
-                let s = start % n;
-                let second = if s.is_multiple_of(b) { s } else { (s + b) % n };
-                [s / b, second / b]
-            }
+            // From start - n < B on.
+            Wrap::Repeat => [0, usize::from(start > n)],
             // [low, high] backwards; 2Bi < n and B < n make `high` not negative.
             Wrap::Mirror => {
-                let (low, high) = ((2 * n - 1).saturating_sub(start + 2 * b), 2 * n - 1 - start);
+                let (low, high) = ((2 * n - 1).saturating_sub(start + b), 2 * n - 1 - start);
                 let first = low / b;
-                let enough = first * b + 2 * b >= high;
+                let enough = first * b + b >= high;
                 [first, if enough { first } else { first + 1 }]
             }
         };
         Parts::new(2 * i, beyond)
     }
 
-    /// The entries, [Bi, Bi + 2B] unfolded, that hold a texel of `first..=last`.
+    /// The entries, [Bi, Bi + B] unfolded, that hold a texel of `first..=last`.
     pub fn holding(self, first: usize, last: usize) -> Ranges {
         let (b, n, blocks) = (self.side(), self.texels, self.blocks());
-        let reach = b * (blocks + 1); // the last texel of the last entry
+        let reach = b * blocks; // the last texel of the last entry
         let mut found = Vec::new();
         let mut image = |first: usize, last: usize| {
-            let from = first.saturating_sub(2 * b).div_ceil(b);
+            let from = first.saturating_sub(b).div_ceil(b);
             found.push(from..blocks.min(last / b + 1));
         };
         match self.wrap {
@@ -92,11 +88,10 @@ impl Axis {
         Ranges::new(found)
     }
 
-    /// The entries of the next level with a part among `changed` of this one (and maybe a neighbour).
+    /// The entries of the next level with a part among `changed` of this one.
     pub fn made_of(self, changed: &Ranges) -> Ranges {
         let blocks = self.coarser().blocks();
-        let regular =
-            |r: &Range<usize>| r.start.saturating_sub(2).div_ceil(2)..blocks.min(r.end.div_ceil(2));
+        let regular = |r: &Range<usize>| r.start / 2..blocks.min(r.end.div_ceil(2));
         let mut found: Vec<_> = changed.0.iter().map(regular).collect();
         let last = self.parts(blocks - 1);
         if last.iter().any(|part| changed.contains(part)) {

@@ -68,7 +68,9 @@ fn coarser<T: Pack>(finer: &[T::Packed], axes: [Axis; 2]) -> Vec<T::Packed> {
     in_bands(next, |first, band: &mut [T::Packed]| {
         for (j, row) in (first..).zip(band.chunks_mut(next[0].blocks())) {
             let entry = |i: usize, j: usize| T::unpack(finer[j * width + i]);
-            reduce::coarser_row(axes, j, entry, row);
+            for (i, out) in row.iter_mut().enumerate() {
+                *out = T::pack(reduce::coarser(axes, (i, j), entry));
+            }
         }
     })
 }

@@ -2,10 +2,10 @@
 //! it use them.
 
 use super::axis::{Axis, Parts};
-use super::entries::{Bounds, Pack};
+use super::entries::Bounds;
 
 /// Columns and rows of texels that one finest entry holds beyond its own block of [`SIDE`].
-pub const BEYOND: usize = SIDE + 1;
+pub const BEYOND: usize = 1;
 
 /// Cells across the finest blocks.
 pub const SIDE: usize = 4;
@@ -30,27 +30,13 @@ impl<T: Copy + PartialOrd> Strip<T> {
         }
     }
 
-    /// Of four rows of one length.
-    fn set_rows(&mut self, [a, b, c, d]: [&[T]; SIDE]) {
-        let all = || a.iter().zip(b).zip(c.iter().zip(d));
-        let low = all().map(|((&a, &b), (&c, &d))| min(min(a, b), min(c, d)));
+    /// Of five rows of one length.
+    fn set_rows(&mut self, [a, b, c, d, e]: [&[T]; SIDE + BEYOND]) {
+        let all = || a.iter().zip(b).zip(c.iter().zip(d)).zip(e);
+        let low = all().map(|(((&a, &b), (&c, &d)), &e)| min(min(min(a, b), min(c, d)), e));
         replace(&mut self.low, low);
-        let high = all().map(|((&a, &b), (&c, &d))| max(max(a, b), max(c, d)));
+        let high = all().map(|(((&a, &b), (&c, &d)), &e)| max(max(max(a, b), max(c, d)), e));
         replace(&mut self.high, high);
-    }
-
-    /// Of two strips and a row more.
-    fn set_union(&mut self, a: &Self, b: &Self, row: &[T]) {
-        let low = a.low.iter().zip(&b.low).zip(row);
-        let high = a.high.iter().zip(&b.high).zip(row);
-        replace(
-            &mut self.low,
-            low.map(|((&a, &b), &row)| min(min(a, b), row)),
-        );
-        replace(
-            &mut self.high,
-            high.map(|((&a, &b), &row)| max(max(a, b), row)),
-        );
     }
 
     /// Adds columns up to `length`, each a copy of column `source(index)`.
@@ -75,21 +61,14 @@ impl<T: Copy + PartialOrd> Strip<T> {
         );
     }
 
-    /// Smallest and largest of columns 4i ..= 4i + 8, for each i that has them.
+    /// Smallest and largest of columns 4i ..= 4i + 4, for each i that has them.
     pub fn entries(&self) -> impl Iterator<Item = (T, T)> {
-        // One block, the next, and the first column of the one after it.
-        let low = self.low_of_four.iter().zip(&self.low_of_four[1..]);
-        let high = self.high_of_four.iter().zip(&self.high_of_four[1..]);
-        let beyond = self.low[2 * SIDE..].chunks(SIDE);
-        let beyond = beyond.zip(self.high[2 * SIDE..].chunks(SIDE));
-        low.zip(high).zip(beyond).map(
-            |(((&low, &next_low), (&high, &next_high)), (last_low, last_high))| {
-                (
-                    min(min(low, next_low), last_low[0]),
-                    max(max(high, next_high), last_high[0]),
-                )
-            },
-        )
+        // One block, and the first column of the next.
+        let low = (self.low_of_four.iter()).zip(self.low[SIDE..].chunks(SIDE));
+        let high = (self.high_of_four.iter()).zip(self.high[SIDE..].chunks(SIDE));
+        low.zip(high).map(|((&low, next_low), (&high, next_high))| {
+            (min(low, next_low[0]), max(high, next_high[0]))
+        })
     }
 }
 
@@ -99,7 +78,7 @@ fn replace<T>(column: &mut Vec<T>, by: impl Iterator<Item = T>) {
 }
 
 /// Block rows `rows` of the finest level: each as a strip of at least `length` columns over texel rows
-/// 4j ..= 4j + 8, unfolded, which `row` gives; missing columns are copies of column `source(index)`.
+/// 4j ..= 4j + 4, unfolded, which `row` gives; missing columns are copies of column `source(index)`.
 pub fn finest<'t, T: Copy + PartialOrd + 't>(
     rows: std::ops::Range<usize>,
     length: usize,
@@ -107,16 +86,12 @@ pub fn finest<'t, T: Copy + PartialOrd + 't>(
     source: impl Fn(usize) -> usize,
     mut done: impl FnMut(usize, &Strip<T>),
 ) {
-    let four = |j: usize| [0, 1, 2, 3].map(|k| row(SIDE * j + k));
-    let (mut own, mut next, mut all) = (Strip::new(), Strip::new(), Strip::new());
-    next.set_rows(four(rows.start));
+    let mut strip = Strip::new();
     for j in rows {
-        std::mem::swap(&mut own, &mut next);
-        next.set_rows(four(j + 1));
-        all.set_union(&own, &next, row(SIDE * (j + 2)));
-        all.extend(length, &source);
-        all.join_columns();
-        done(j, &all);
+        strip.set_rows(std::array::from_fn(|k| row(SIDE * j + k)));
+        strip.extend(length, &source);
+        strip.join_columns();
+        done(j, &strip);
     }
 }
 
@@ -126,6 +101,7 @@ pub fn columns(blocks: usize) -> usize {
 }
 
 /// Entry (i, j) of the level above the one that `entry` reads and `x` and `y` describe.
+#[inline(always)]
 pub fn coarser<T: Copy + PartialOrd>(
     [x, y]: [Axis; 2],
     (i, j): (usize, usize),
@@ -133,28 +109,6 @@ pub fn coarser<T: Copy + PartialOrd>(
 ) -> Bounds<T> {
     let rows = y.parts(j);
     union(x.parts(i), |i| union(rows, |j| entry(i, j)))
-}
-
-/// All entries of row j as [`coarser`] makes them, with fewer reads: where entry i is 2i and 2i + 2, the second is the
-/// first of entry i + 1.
-pub fn coarser_row<T: Pack>(
-    [x, y]: [Axis; 2],
-    j: usize,
-    entry: impl Fn(usize, usize) -> Bounds<T>,
-    row: &mut [T::Packed],
-) {
-    let rows = y.parts(j);
-    let column = |i: usize| union(rows, |j| entry(i, j));
-    let mut left = column(0);
-    let regular = (x.blocks() - 1) / 2;
-    for (i, out) in row[..regular].iter_mut().enumerate() {
-        let right = column(2 * i + 2);
-        *out = T::pack(joined(left, right));
-        left = right;
-    }
-    for (i, out) in row.iter_mut().enumerate().skip(regular) {
-        *out = T::pack(union(x.parts(i), column));
-    }
 }
 
 #[inline(always)]

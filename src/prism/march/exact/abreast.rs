@@ -163,7 +163,7 @@ impl<'a, L: Lanes> Team<'a, L> {
     #[inline(always)]
     fn step_to_chords(&mut self) -> u32 {
         let (base_x, base_y) = (L::splat(self.base[0]), L::splat(self.base[1]));
-        let base_off = L::splat(2.0 * f32::EPSILON * self.base[0].abs().max(self.base[1].abs()));
+        let base_off = L::splat(4.0 * f32::EPSILON * self.base[0].abs().max(self.base[1].abs()));
         let mut ready = 0;
         // Lanes that are ready stay where they are, and do the same again.
         while self.walking & !ready != 0 && self.rounds < MOST_ROUNDS {
@@ -178,7 +178,7 @@ impl<'a, L: Lanes> Team<'a, L> {
             let (left, right) = (x0.min(x1) - off, x0.max(x1) + off);
             let (bottom, top) = (y0.min(y1) - off, y0.max(y1) + off);
             let [low, high] = self.grid.block_ranges(
-                (right - left).max(top - bottom),
+                (right - left).max(top - bottom) + base_off,
                 [base_x + left, base_x + right],
                 [base_y + bottom, base_y + top],
             );

@@ -2,8 +2,8 @@
 //!
 //! A span is cut into 7 or 15 children at once. Texel coordinates (x, y), barycentrics and the ray's height
 //! h = w |N'| are evaluated at their ends; a child's box is that of its two ends, widened by how far the curve may
-//! leave the chord between them ([`arcs`](super::arcs)). One gather from the pyramid level whose block is at least as large as
-//! the box gives the surface's range there; a child above or below it is done with.
+//! leave the chord between them ([`arcs`](super::arcs)). The four blocks that its corners lie in, of the pyramid level whose blocks
+//! are at least as large as the box, give the surface's range there; a child above or below it is done with.
 
 mod record;
 
@@ -328,8 +328,9 @@ impl<'a> Walker<'a> {
         let [x, y] = self.base;
         let off = self.arcs.bend[l] * ds * ds
             + self.arcs.rounding[l]
-            + 2.0 * f32::EPSILON * x.abs().max(y.abs());
-        (off, self.grid.level(self.arcs.reach[l] * ds + 2.0 * off))
+            + 4.0 * f32::EPSILON * x.abs().max(y.abs());
+        // Ends are computed as far off as that at most, beside what is put around them.
+        (off, self.grid.level(self.arcs.reach[l] * ds + 4.0 * off))
     }
 
     #[inline(always)]
