@@ -8,10 +8,10 @@
 //!
 //! **Never too strict.** Coordinates are relative to the [anchor](Anchored): a projected coordinate is the difference of two
 //! f32 numbers and a product with the shear, each rounded once. With u = 2^-24, R the largest projected coordinate, d
-//! the largest depth from the anchor, m the largest shear (at most 1) and W the largest |w|, it is off by at most u (3R + 4md) for a, 2.5u W for
-//! w e and u R for their sum: c = 4u (R + md) + 2.5u W. A cross product of two is off by 4 R c and its own roundings of
-//! less than 6u R^2. The slack is the sum. Depths are off by at most u (2d + W) at both ends of the range, and by 6u W more between
-//! them, where w is rounded.
+//! the largest depth from the anchor, m the largest shear (at most 1) and W the largest |w|, it is off by at most u (3R + 5md) for a, 5u W for
+//! w e and u R for their sum: c = u (4R + 5md + 5W). With X and Y the largest projected coordinates along each axis, a cross product of two
+//! is off by 2c (X + Y) and its own roundings of less than 6.5u X Y. The slack is the sum. Depths are off by at most u (2d + W)
+//! at both ends of the range, and by 6u W more between them, where w is rounded.
 
 use super::cluster::PrismLanes;
 use super::ray_frame::{Beam, RayLanes};
@@ -28,6 +28,9 @@ pub struct Sight<L> {
     pub areas: [[L; 3]; 3],
     /// How far these are off at most.
     pub off: L,
+    /// The largest projected coordinate along each axis, and how far any is off at most.
+    pub widest: [L; 2],
+    pub coordinate_off: L,
     /// How far a depth is, at any w, and w at most.
     pub depth_off: L,
     pub reach: L,
@@ -46,6 +49,8 @@ impl<L: Lanes> Sight<L> {
         let Projection {
             depths,
             slopes,
+            widest,
+            coordinate_off,
             off,
             depth_off,
             reach,
@@ -64,6 +69,8 @@ impl<L: Lanes> Sight<L> {
             slopes,
             areas,
             off,
+            widest,
+            coordinate_off,
             depth_off,
             reach,
             nearest,
@@ -89,7 +96,7 @@ pub fn met_by_beam<L: Lanes>(prisms: &PrismLanes<L>, beam: &Beam) -> (u32, [L; 2
         deepest.mul_add(turn_x, near_x),
         deepest.mul_add(turn_y, near_y),
     );
-    let farthest_off = seen.widest + moved_x.max(moved_y);
+    let farthest_off = seen.widest[0].max(seen.widest[1]) + moved_x.max(moved_y);
     let turned = farthest_off * (seen.farthest - seen.nearest) * (turn_x + turn_y);
     let slack = moved_x.mul_add(seen.extent(1), moved_y.mul_add(seen.extent(0), turned));
     let off = seen.off + slack * L::splat(1.001);
@@ -104,8 +111,9 @@ struct Projection<L> {
     at_high: [[L; 2]; 3],
     depths: [L; 3],
     slopes: [L; 3],
-    /// The largest projected coordinate.
-    widest: L,
+    /// The largest projected coordinates, and how far any is off.
+    widest: [L; 2],
+    coordinate_off: L,
     off: L,
     depth_off: L,
     reach: L,
@@ -124,7 +132,7 @@ impl<L: Lanes> Projection<L> {
         let mut at_low = [[zero; 2]; 3];
         let mut at_high = [[zero; 2]; 3];
         let (mut depths, mut slopes) = ([zero; 3], [zero; 3]);
-        let (mut widest, mut deepest) = (zero, zero);
+        let (mut widest, mut deepest) = ([zero; 2], zero);
         let (mut nearest, mut farthest) = (L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY));
         for k in 0..3 {
             let depth = vertices[k][2] - ray.depth;
@@ -139,7 +147,7 @@ impl<L: Lanes> Projection<L> {
                 let a = depth.neg_mul_add(shear, from_anchor);
                 let e = slope.neg_mul_add(shear, normals[k][axis]);
                 let (p, q) = (low.mul_add(e, a), high.mul_add(e, a));
-                widest = widest.max(p.abs().max(q.abs())).max(a.abs());
+                widest[axis] = widest[axis].max(p.abs().max(q.abs())).max(a.abs());
                 (at_low[k][axis], at_high[k][axis]) = (p, q);
             }
             (depths[k], slopes[k]) = (depth, slope);
@@ -147,15 +155,18 @@ impl<L: Lanes> Projection<L> {
         let reach = low.abs().max(high.abs());
         let unit = L::splat(f32::EPSILON);
         let shear = ray.shear[0].abs().max(ray.shear[1].abs());
-        let lateral = shear.mul_add(deepest, widest) * L::splat(2.0);
-        let coordinate = reach.mul_add(L::splat(1.25), lateral) * unit;
+        let [x, y] = widest;
+        let sheared = shear.mul_add(deepest, reach) * L::splat(2.5 * 1.001);
+        let coordinate_off = x.max(y).mul_add(L::splat(2.0 * 1.001), sheared) * unit;
+        let rounding = x * y * unit * L::splat(3.25 * 1.001);
         Self {
             at_low,
             at_high,
             depths,
             slopes,
             widest,
-            off: widest * (coordinate * L::splat(4.5) + widest * unit * L::splat(3.0)),
+            coordinate_off,
+            off: (x + y).mul_add(coordinate_off * L::splat(2.0 * 1.001), rounding),
             depth_off: reach.mul_add(L::splat(3.5), deepest) * unit,
             reach,
             nearest,

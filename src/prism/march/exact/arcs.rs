@@ -19,8 +19,11 @@ use bounds::{Lanewise, Uncertain};
 /// The smallest A of an arc, as a part of its largest.
 const EVEN: f32 = 0.25;
 
+/// And as a multiple of how far areas are off: barycentrics on an arc are above -2/64 then.
+const CERTAIN: f32 = 64.0;
+
 /// The largest rounding of an arc, in texels. Larger ones would only mean more looks in f64.
-const FINE: f32 = 1.0 / 16.0;
+const FINE: f32 = 1.0 / 32.0;
 
 /// One number for each lane.
 type Row = [f32; LANES];
@@ -156,23 +159,28 @@ impl<L: Lanes> Cut<L> {
             least.select_negative(zero - least, most),
             least,
         );
-        let even = least - off * L::splat(5.0) - most * L::splat(EVEN);
+        let even = least - off * L::splat(CERTAIN) - most * L::splat(EVEN);
 
         let sides = [
             flipped(sight.areas[0], flip),
             flipped(sight.areas[1], flip),
             flipped(sight.areas[2], flip),
         ];
-        let [(b0, e0), (b1, e1), (b2, e2)] = [
-            outside(sides[0], off),
-            outside(sides[1], off),
-            outside(sides[2], off),
+        // What sides are off by rounding alone when they are cut: see the bounds.
+        let [wide_x, wide_y] = sight.widest;
+        let (m0, m1, m2) = (largest(sides[0]), largest(sides[1]), largest(sides[2]));
+        let rounding = (wide_x * wide_y).mul_add(
+            L::splat(2.25 * f32::EPSILON),
+            m0.max(m1).max(m2) * L::splat(12.5 * f32::EPSILON),
+        );
+        let (from, to) = inside(&sides, [zero, one], off);
+        // Once more, from what is left: there the sides are closer to straight, so that less is left of rays that pass by.
+        let parts = [
+            part(sides[0], from, to),
+            part(sides[1], from, to),
+            part(sides[2], from, to),
         ];
-        // What is no number says nothing.
-        let from = b0.max(b1.max(b2.max(zero)));
-        let to = one - e0.max(e1.max(e2.max(zero)));
-        let hair = L::splat(4.0 * f32::EPSILON);
-        let (from, to) = ((from - hair).max(zero), (to + hair).min(one));
+        let (from, to) = inside(&parts, [from, to], off + rounding);
         let empty = (to - from).sign_mask();
 
         // In the order of t: see `Curve`.
@@ -226,7 +234,7 @@ impl<L: Lanes> Cut<L> {
         Self {
             arcs,
             uncertain: Uncertain {
-                area: off * L::splat(2.5),
+                area: (wide_x + wide_y).mul_add(sight.coordinate_off * L::splat(1.2), rounding),
                 texels: extent(x1, x2).max(extent(y1, y2)),
                 time: (sight.farthest - sight.nearest) * per_depth,
                 time_off: sight.depth_off * per_depth * L::splat(2.0),
@@ -387,6 +395,25 @@ fn flipped<L: Lanes>([q0, q1, q2]: [L; 3], flip: L) -> [L; 3] {
     ]
 }
 
+/// The part of [from, to] on which no side is surely below -`off`, a hair too long; these are the sides' Bernstein coefficients over
+/// all of it.
+#[inline(always)]
+fn inside<L: Lanes>(sides: &[[L; 3]; 3], [from, to]: [L; 2], off: L) -> (L, L) {
+    let zero = L::splat(0.0);
+    let (b0, e0) = outside(sides[0], off);
+    let (b1, e1) = outside(sides[1], off);
+    let (b2, e2) = outside(sides[2], off);
+    // What is no number says nothing.
+    let begin = b0.max(b1.max(b2.max(zero)));
+    let end = e0.max(e1.max(e2.max(zero)));
+    let hair = L::splat(4.0 * f32::EPSILON);
+    let length = to - from;
+    (
+        (begin.mul_add(length, from) - hair).max(from),
+        (end.neg_mul_add(length, to) + hair).min(to),
+    )
+}
+
 /// How far from its beginning, and from its end, a quadratic in Bernstein form is surely below -`off`:
 /// q0 + s ((1 - s) 2 (q1 - q0) + s (q2 - q0)) is up to s = -q0 over the larger of the two.
 #[inline(always)]
@@ -399,6 +426,12 @@ fn outside<L: Lanes>([q0, q1, q2]: [L; 3], off: L) -> (L, L) {
     )
 }
 
+/// The largest magnitude.
+#[inline(always)]
+fn largest<L: Lanes>([q0, q1, q2]: [L; 3]) -> L {
+    q0.abs().max(q1.abs()).max(q2.abs())
+}
+
 /// The sum of the three sides, coefficient by coefficient.
 #[inline(always)]
 fn sum<L: Lanes>([p, q, r]: [[L; 3]; 3]) -> [L; 3] {
@@ -408,14 +441,20 @@ fn sum<L: Lanes>([p, q, r]: [[L; 3]; 3]) -> [L; 3] {
 /// A quadratic in Bernstein form over [a, b] of it: coefficients of 1, s, s^2.
 #[inline(always)]
 fn between<L: Lanes>([q0, q1, q2]: [L; 3], a: L, b: L) -> [L; 3] {
+    let [first, middle, last] = part([q0, q1, q2], a, b);
+    let (rise, more) = (middle - first, last - middle);
+    [first, rise + rise, more - rise]
+}
+
+/// The same in Bernstein form.
+#[inline(always)]
+fn part<L: Lanes>([q0, q1, q2]: [L; 3], a: L, b: L) -> [L; 3] {
     let (d0, d1) = (q1 - q0, q2 - q1);
     let (left, right) = (a.mul_add(d0, q0), a.mul_add(d1, q1));
     let first = a.mul_add(right - left, left);
     let middle = b.mul_add(right - left, left);
     let (left, right) = (b.mul_add(d0, q0), b.mul_add(d1, q1));
-    let last = b.mul_add(right - left, left);
-    let (rise, more) = (middle - first, last - middle);
-    [first, rise + rise, more - rise]
+    [first, middle, b.mul_add(right - left, left)]
 }
 
 /// sum of the sides' quadratics times one number each.
@@ -443,3 +482,6 @@ fn squared_distance<L: Lanes>([px, py, pz]: [L; 3], [qx, qy, qz]: [L; 3]) -> L {
     let (x, y, z) = (qx - px, qy - py, qz - pz);
     x.mul_add(x, y.mul_add(y, z * z))
 }
+
+#[cfg(test)]
+mod tests;

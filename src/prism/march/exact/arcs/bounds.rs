@@ -5,8 +5,15 @@
 //! |r''|/2 <= M = (|n2 - a2 r(0)| + R (|a2| + max|A'|)) / A_min; a chord of length ds is left by at most M ds^2/4.
 //! For h = w k with k = |N'(b(s))|, convex in b: |k'| <= K1 = |n1-n0| R_u + |n2-n0| R_v,
 //! |k''|/2 <= K2 = |n1-n0| M_u + |n2-n0| M_v + K1^2/(2 k_min), so |h''|/2 <= |w| K2 + |dw| K1.
-//! To these come the roundings of the f32 evaluation, at most 8 units of the sum of magnitudes that each value is made of;
-//! and of the set-up: with every Q_i off by at most q, sum b_i x_i is off by sum |x_i - x| q / A <= 2 q (max x_i - min x_i) / A.
+//! To these come the roundings of the f32 evaluation, at most 8 units of the sum of magnitudes that each value is made of,
+//! and of the set-up.
+//!
+//! **The set-up.** [Seen](crate::prism::sight) corners are off by at most c along each axis, so sum b_i p_i is not 0 but e, |e| at
+//! most c sum |b_i|. That moves b_i by e x (edge opposite) / A, at most 2c (X + Y) sum |b_i| / A with X and Y the largest |p| along
+//! each axis; and as these movements add up to 0, sum b_i x_i by no more than max x_i - min x_i times that. On an arc sum |b_i| is
+//! below 1.13. Beside that Q_i is off by q = u (4.5 X Y + 25 M), u = 2^-24: by products and sums of the corners, and, with M the
+//! largest |Q| over the range of w, by what cuts out the arc; and sum b_i x_i by sum |x_i - x| q / A <= 2q (max x_i - min x_i) / A.
+//! Where a ray grazes the prism A is small beside X Y, but not beside M.
 
 use super::{Arcs, Rows3, Units};
 use crate::prism::simd::Lanes;
@@ -29,7 +36,7 @@ pub struct Lanewise<L> {
 
 /// What the set-up of arcs left uncertain.
 pub struct Uncertain<L> {
-    /// A numerator of a barycentric.
+    /// Numerators of barycentrics: these are off by twice as much over A.
     pub area: L,
     /// Extents of a prism in texels, and in ray parameters.
     pub texels: L,
