@@ -78,7 +78,7 @@ fn images(wrap: Wrap, low: f64, high: f64, n: f64) -> [Option<[f64; 2]>; 2] {
     let all = [0.0, n];
     match wrap {
         Wrap::Clamp => [Some([first, last]), None],
-        // Not even a number of the side's own.
+        // A period or more, or no number.
         _ if length >= n || length.is_nan() => [Some(all), None],
         Wrap::Repeat if first + length <= n => [Some([first, first + length]), None],
         Wrap::Repeat => [Some([first, n]), Some([0.0, first + length - n])],
