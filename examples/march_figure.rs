@@ -247,7 +247,7 @@ impl<'a> Figure<'a> {
             60.0,
             49.0,
             13.0,
-            "Its curve over the map is cut into 15 children, each held against one entry of the map's pyramid.",
+            "Its curve over the map is cut into 15 children, each held against the map's pyramid.",
         );
         self.panel(&mut svg, &whole, 0, [0, 0]);
         // What is close up below.

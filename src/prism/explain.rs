@@ -32,7 +32,7 @@ pub enum Fate {
     Behind,
 }
 
-/// A child of a span: a part of the curve that was held against one entry of the map's pyramid.
+/// A child of a span: a part of the curve that was held against the map's pyramid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpanChild {
     /// How often the span that it is a part of was cut from another.
