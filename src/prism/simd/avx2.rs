@@ -174,14 +174,12 @@ impl Lanes for Avx2 {
 
     #[inline(always)]
     fn block_ranges(level: &Level, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
-        // Moved inside here, as in `cell_corners`.
-        let zero = Self::splat(0.0);
-        let last_i = Self::splat((level.width() - 1) as f32);
-        let last_j = Self::splat((level.height() - 1) as f32);
-        let i = [i[0].max(zero).min(last_i), i[1].max(zero).min(last_i)];
-        let j = [j[0].max(zero).min(last_j), j[1].max(zero).min(last_j)];
-        // SAFETY: AVX2 is there. 0 <= i < width and 0 <= j < height, so the four are stored pairs of the level.
+        // SAFETY: AVX2 is there. Moved inside, 0 <= i < width and 0 <= j < height, so the four are stored pairs of the level.
         unsafe {
+            let last_i = _mm256_set1_epi32(level.width() as i32 - 1);
+            let last_j = _mm256_set1_epi32(level.height() as i32 - 1);
+            let i = [whole(i[0], last_i), whole(i[1], last_i)];
+            let j = [whole(j[0], last_j), whole(j[1], last_j)];
             let width = _mm256_set1_epi32(level.width() as i32);
             let offset = _mm256_set1_epi32(level.offset() as i32);
             of_blocks(level.entries(), i, j, width, offset)
@@ -192,7 +190,7 @@ impl Lanes for Avx2 {
     fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: [Self; 2], y: [Self; 2]) -> [Self; 2] {
         let rows = grid.rows;
         // SAFETY: AVX2 is there. The level is one of the pyramid's, and the blocks are moved inside it, so they are stored
-        // pairs: rows beyond the last level repeat it, and `max` gives 0 for NaN.
+        // pairs: rows beyond the last level repeat it.
         unsafe {
             // The exponent of `size`, 1 for sizes from 2 to 4: the level is one less.
             let exponent = _mm256_srli_epi32::<23>(_mm256_castps_si256(size.abs().0));
@@ -202,13 +200,12 @@ impl Lanes for Avx2 {
             let per_block = Self(looked_up(rows.per_block.as_ptr().cast(), level));
             let last_i = Self(looked_up(rows.last[0].as_ptr().cast(), level));
             let last_j = Self(looked_up(rows.last[1].as_ptr().cast(), level));
-            let zero = Self::splat(0.0);
             let end_i = grid.within((x[1] * per_block).floor(), last_i);
             let end_j = grid.within((y[1] * per_block).floor(), last_j);
-            let first_i = (x[0] * per_block).max(zero).min(last_i);
-            let first_j = (y[0] * per_block).max(zero).min(last_j);
-            let i = [first_i, end_i.max(zero).min(last_i)];
-            let j = [first_j, end_j.max(zero).min(last_j)];
+            let last_i = _mm256_cvttps_epi32(last_i.0);
+            let last_j = _mm256_cvttps_epi32(last_j.0);
+            let i = [whole(x[0] * per_block, last_i), whole(end_i, last_i)];
+            let j = [whole(y[0] * per_block, last_j), whole(end_j, last_j)];
             let width = _mm256_castps_si256(looked_up(rows.width.as_ptr().cast(), level));
             let offset = _mm256_castps_si256(looked_up(rows.offset.as_ptr().cast(), level));
             of_blocks(grid.levels[0].entries(), i, j, width, offset)
@@ -217,11 +214,8 @@ impl Lanes for Avx2 {
 
     #[inline(always)]
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4] {
-        // Moved inside here, so that the gathers below are in bounds whatever the caller passes; `max` gives 0
-        // for NaN.
-        let i = i.max(Self::splat(0.0)).min(Self::splat(grid.size[0] - 1.0));
-        let j = j.max(Self::splat(0.0)).min(Self::splat(grid.size[1] - 1.0));
-        // SAFETY: AVX2 is there. 0 <= i <= width - 1 and 0 <= j <= height - 1, so index + stride + 1 is at most
+        // SAFETY: AVX2 is there. i and j are moved inside, so that the gathers are in bounds whatever the caller passes:
+        // 0 <= i <= width - 1 and 0 <= j <= height - 1, so index + stride + 1 is at most
         // (height + 1) * (width + 1) - 1, the last stored texel; it fits i32 because sides are at most
         // `DisplacementMap::MAX_SIDE`. The 32-bit loads of narrower texels start at such a texel and end inside
         // the four texels that `StoredTexels` keeps after the last one.
@@ -229,9 +223,10 @@ impl Lanes for Avx2 {
         // rests on the machine: the memory is atomics', so the compiler takes no value for constant, the intrinsic
         // is opaque to it, and x86 never tears an aligned texel: it is the old one or the new one.
         unsafe {
+            let i = whole(i, _mm256_set1_epi32(grid.size[0] as i32 - 1));
+            let j = whole(j, _mm256_set1_epi32(grid.size[1] as i32 - 1));
             let stride = _mm256_set1_epi32(grid.stride as i32);
-            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(j.0), stride);
-            let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(i.0));
+            let index = _mm256_add_epi32(_mm256_mullo_epi32(j, stride), i);
             let above = _mm256_add_epi32(index, stride);
             match grid.texels {
                 StoredTexels::U8(t) => {
@@ -261,6 +256,13 @@ impl Lanes for Avx2 {
     }
 }
 
+/// The whole part of numbers from 0 to `last`; others, and NaN, become `last`.
+#[inline(always)]
+fn whole(x: Avx2, last: __m256i) -> __m256i {
+    // SAFETY: AVX2 is there wherever an `Avx2` is. What is no 32-bit number becomes i32::MIN, which is large without its sign.
+    unsafe { _mm256_min_epu32(_mm256_cvttps_epi32(x.0), last) }
+}
+
 /// Entries of a table of sixteen words, by numbers from 0 to 15.
 ///
 /// # Safety
@@ -285,17 +287,18 @@ unsafe fn looked_up(table: *const f32, index: __m256i) -> __m256 {
 #[inline(always)]
 unsafe fn of_blocks(
     entries: &Entries,
-    i: [Avx2; 2],
-    j: [Avx2; 2],
+    [i0, i1]: [__m256i; 2],
+    j: [__m256i; 2],
     width: __m256i,
     offset: __m256i,
 ) -> [Avx2; 2] {
     // SAFETY: the caller's; loads of more than a pair end inside the pairs that `Entries` keeps after the last one. Edits
     // meanwhile: as in `cell_corners`.
     unsafe {
-        let (i0, i1) = (_mm256_cvttps_epi32(i[0].0), _mm256_cvttps_epi32(i[1].0));
-        let row0 = _mm256_mullo_epi32(_mm256_cvttps_epi32(j[0].0), width);
-        let row1 = _mm256_mullo_epi32(_mm256_cvttps_epi32(j[1].0), width);
+        let (row0, row1) = (
+            _mm256_mullo_epi32(j[0], width),
+            _mm256_mullo_epi32(j[1], width),
+        );
         let (row0, row1) = (
             _mm256_add_epi32(row0, offset),
             _mm256_add_epi32(row1, offset),

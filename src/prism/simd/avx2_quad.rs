@@ -5,7 +5,8 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use glam::Vec4;
 
-use super::quad::Quad;
+use super::quad::{Quad, Real, sampled_in_lanes};
+use crate::surface::DisplacementMap;
 
 #[derive(Clone, Copy)]
 pub struct Avx2Quad(__m256d);
@@ -28,13 +29,26 @@ lanewise!(Sub, sub, _mm256_sub_pd);
 lanewise!(Mul, mul, _mm256_mul_pd);
 lanewise!(Div, div, _mm256_div_pd);
 
-impl Quad for Avx2Quad {
+impl Real for Avx2Quad {
     #[inline(always)]
     fn splat(x: f64) -> Self {
         // SAFETY: called in AVX2 kernels only (module documentation).
         Self(unsafe { _mm256_set1_pd(x) })
     }
 
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: AVX is there wherever an `Avx2Quad` is.
+        Self(unsafe { _mm256_sqrt_pd(self.0) })
+    }
+
+    #[inline(always)]
+    fn sampled(map: &DisplacementMap, texel: [Self; 2]) -> [Self; 3] {
+        sampled_in_lanes(map, texel)
+    }
+}
+
+impl Quad for Avx2Quad {
     #[inline(always)]
     fn from_array(x: [f64; 4]) -> Self {
         // SAFETY: called in AVX2 kernels only; an unaligned load of 4 doubles from an array of 4.
@@ -77,12 +91,6 @@ impl Quad for Avx2Quad {
     fn max(self, other: Self) -> Self {
         // SAFETY: AVX is there wherever an `Avx2Quad` is.
         Self(unsafe { _mm256_max_pd(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        // SAFETY: AVX is there wherever an `Avx2Quad` is.
-        Self(unsafe { _mm256_sqrt_pd(self.0) })
     }
 
     #[inline(always)]

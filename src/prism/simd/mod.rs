@@ -21,7 +21,7 @@ use crate::surface::{DisplacementMap, Level, LevelRows, StoredTexels, Wrap};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
 pub(crate) use portable::Portable;
-pub(crate) use quad::Quad;
+pub(crate) use quad::{Quad, Real};
 
 /// The instruction set of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,8 +112,8 @@ pub(crate) trait Lanes:
     fn max_lane(self) -> f32;
     /// Bit k: lane k's sign bit.
     fn sign_mask(self) -> u32;
-    /// Smallest and largest stored texel of four blocks of a level in columns i and rows j, integers in float lanes. The second column
-    /// is the first, the next, or one before. Blocks outside the level, and NaN, are moved inside first.
+    /// Smallest and largest stored texel of four blocks of a level in the columns and rows in which i and j are, in blocks. The second
+    /// column is the first, the next, or one before. What is outside the level, and NaN, is moved inside first.
     fn block_ranges(level: &Level, i: [Self; 2], j: [Self; 2]) -> [Self; 2];
     /// The same of the blocks in which boxes from (x, y) to (x, y), folded at their low end only, begin and end, each on the finest
     /// level whose blocks are larger than `size`. Sizes and corners are from 0 to 2^24; others are moved there.
@@ -190,21 +190,42 @@ impl<'m> Grid<'m> {
     pub fn block_range<L: Lanes>(&self, level: usize, x: [L; 2], y: [L; 2]) -> [L; 2] {
         let level = &self.levels[level];
         let per_block = L::splat(1.0 / (1u32 << level.shift()) as f32);
-        let (x, y) = (self.folded(x, self.size[0]), self.folded(y, self.size[1]));
-        let last = [level.width(), level.height()].map(|blocks| (blocks - 1) as f32);
-        let end_i = self.within((x[1] * per_block).floor(), L::splat(last[0]));
-        let end_j = self.within((y[1] * per_block).floor(), L::splat(last[1]));
-        let first_i = (x[0] * per_block).floor();
-        let first_j = (y[0] * per_block).floor();
-        L::block_ranges(level, [first_i, end_i], [first_j, end_j])
+        let is_inside = self.is_inside(x, y);
+        let (x, y) = self.folded_boxes(is_inside, x, y);
+        let mut i = [x[0] * per_block, x[1] * per_block];
+        let mut j = [y[0] * per_block, y[1] * per_block];
+        if !is_inside {
+            let last = [level.width(), level.height()].map(|blocks| (blocks - 1) as f32);
+            i[1] = self.within(i[1].floor(), L::splat(last[0]));
+            j[1] = self.within(j[1].floor(), L::splat(last[1]));
+        }
+        L::block_ranges(level, i, j)
     }
 
     /// The same where every lane has its own size of box.
     #[inline(always)]
     pub fn block_ranges<L: Lanes>(&self, size: L, x: [L; 2], y: [L; 2]) -> [L; 2] {
-        let x = self.folded(x, self.size[0]);
-        let y = self.folded(y, self.size[1]);
+        let (x, y) = self.folded_boxes(self.is_inside(x, y), x, y);
         L::block_ranges_by_size(self, size, x, y)
+    }
+
+    /// Whether boxes lie between the first and the last texels, where no wrap mode changes anything: so almost all do.
+    #[inline(always)]
+    fn is_inside<L: Lanes>(&self, x: [L; 2], y: [L; 2]) -> bool {
+        let [width, height] = self.size;
+        let before = x[0].min(y[0]);
+        let behind = (L::splat(width - 1.0) - x[1]).min(L::splat(height - 1.0) - y[1]);
+        before.min(behind).sign_mask() == 0
+    }
+
+    /// [`folded`](Self::folded) in x and in y, where boxes are not all inside.
+    #[inline(always)]
+    fn folded_boxes<L: Lanes>(&self, is_inside: bool, x: [L; 2], y: [L; 2]) -> ([L; 2], [L; 2]) {
+        if is_inside {
+            (x, y)
+        } else {
+            (self.folded(x, self.size[0]), self.folded(y, self.size[1]))
+        }
     }
 
     /// The smallest folded coordinate of a box, or one in the same block, and where the box ends, which may be beyond the edge.

@@ -1,17 +1,43 @@
-//! Four f64 values at once: the set-up of one ray against one prism, whose lanes are the prism's vertices.
+//! Four f64 values at once.
 //!
-//! Lane k is vertex or side k; lane 3 repeats lane 0, so that a rotation is one permutation.
+//! In the set-up of one ray against one prism lane k is vertex or side k; lane 3 repeats lane 0, so that a rotation is one permutation.
+//! Where a packet's hits are landed lanes are rays.
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use glam::Vec4;
+use glam::{DVec2, Vec4};
 
-/// Four f64 values: the least that the set-up needs. Additions and products are rounded one by one unless
-/// [`mul_add`](Self::mul_add) is asked for, so that a side's quadratic has the same digits seen from both prisms.
-pub(crate) trait Quad:
+use crate::surface::DisplacementMap;
+
+/// One f64 value or four, with the same digits in every lane as alone: additions and products are rounded one by one.
+pub(crate) trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     fn splat(x: f64) -> Self;
+    fn sqrt(self) -> Self;
+    /// Height and in-cell gradient of a map at texel coordinates: see [`DisplacementMap::sample`].
+    fn sampled(map: &DisplacementMap, texel: [Self; 2]) -> [Self; 3];
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+    #[inline(always)]
+    fn sampled(map: &DisplacementMap, [x, y]: [Self; 2]) -> [Self; 3] {
+        let sample = map.sample(DVec2::new(x, y));
+        [sample.height, sample.gradient.x, sample.gradient.y]
+    }
+}
+
+/// Four f64 values: the least that the set-up needs. Additions and products are rounded one by one unless
+/// [`mul_add`](Self::mul_add) is asked for, so that a side's quadratic has the same digits seen from both prisms.
+pub(crate) trait Quad: Real {
     fn from_array(x: [f64; 4]) -> Self;
     fn to_array(self) -> [f64; 4];
     /// Three lanes, and the first once more.
@@ -22,7 +48,6 @@ pub(crate) trait Quad:
     fn mul_add(self, a: Self, b: Self) -> Self;
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
-    fn sqrt(self) -> Self;
     fn abs(self) -> Self;
     /// The magnitude of `self` with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
@@ -44,6 +69,25 @@ pub(crate) trait Quad:
         let next = self.rotate();
         self + next + next.rotate()
     }
+}
+
+/// [`Real::sampled`], lane by lane.
+#[inline(always)]
+pub(super) fn sampled_in_lanes<Q: Quad>(map: &DisplacementMap, [x, y]: [Q; 2]) -> [Q; 3] {
+    let (x, y) = (x.to_array(), y.to_array());
+    let (a, b) = (
+        f64::sampled(map, [x[0], y[0]]),
+        f64::sampled(map, [x[1], y[1]]),
+    );
+    let (c, d) = (
+        f64::sampled(map, [x[2], y[2]]),
+        f64::sampled(map, [x[3], y[3]]),
+    );
+    [
+        Q::from_array([a[0], b[0], c[0], d[0]]),
+        Q::from_array([a[1], b[1], c[1], d[1]]),
+        Q::from_array([a[2], b[2], c[2], d[2]]),
+    ]
 }
 
 /// Plain Rust, for every machine.
@@ -74,11 +118,22 @@ lanewise!(Sub, sub);
 lanewise!(Mul, mul);
 lanewise!(Div, div);
 
-impl Quad for PortableQuad {
+impl Real for PortableQuad {
     #[inline(always)]
     fn splat(x: f64) -> Self {
         Self([x; 4])
     }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
+    }
+    #[inline(always)]
+    fn sampled(map: &DisplacementMap, texel: [Self; 2]) -> [Self; 3] {
+        sampled_in_lanes(map, texel)
+    }
+}
+
+impl Quad for PortableQuad {
     #[inline(always)]
     fn from_array(x: [f64; 4]) -> Self {
         Self(x)
@@ -107,10 +162,6 @@ impl Quad for PortableQuad {
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         self.lanewise(other, f64::max)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.map(f64::sqrt))
     }
     #[inline(always)]
     fn abs(self) -> Self {

@@ -7,7 +7,7 @@
 use super::arcs::{Arcs, Places};
 use super::cells::{Chord, MOST_CELLS, Off, root};
 use super::chords::{Chords, Fates};
-use super::landing::land;
+use super::landing::{Guess, land_four};
 use super::signs::Signs;
 use super::span::{CLOSE, SHORTEST, Walker};
 use super::{Found, Problem, Search};
@@ -112,6 +112,7 @@ impl<L: Lanes> Task<L> for Abreast<'_> {
             range: from,
             signs: [None; LANES],
             found: [None; LANES],
+            guesses: [None; LANES],
             walking: lanes,
             cleared: 0,
             rounds: 0,
@@ -120,6 +121,7 @@ impl<L: Lanes> Task<L> for Abreast<'_> {
             let ready = team.step_to_chords();
             team.walk_chords(ready);
         }
+        team.land_all();
         team.found
     }
 }
@@ -151,6 +153,8 @@ struct Team<'a, L: Lanes> {
     range: L,
     signs: [Option<Signs<'a, L::Quad>>; LANES],
     found: [Option<Found>; LANES],
+    /// Crossings that are certain, of lanes that are done.
+    guesses: [Option<Guess>; LANES],
     /// Lanes that are not done.
     walking: u32,
     /// Lanes whose last step was clear.
@@ -250,7 +254,7 @@ impl<'a, L: Lanes> Team<'a, L> {
         self.pass(at_chord);
     }
 
-    /// Ends a lane at a crossing that is certain, where it can.
+    /// Ends a lane at a crossing that is certain, where it can: it is [landed](Self::land_all) with the others.
     #[inline(always)]
     fn land(&mut self, lane: usize, rows: &Rows, fates: &Fates) -> bool {
         if self.signs[lane].is_some() {
@@ -273,11 +277,43 @@ impl<'a, L: Lanes> Team<'a, L> {
             times,
             f[0] > 0.0,
         );
-        let Some(landed) = land(&problem.patch(), &self.frames[lane], &guess) else {
-            return false;
-        };
-        self.end_with(lane, problem.accepts(landed.t).then_some(landed));
+        self.guesses[lane] = Some(guess);
+        self.end_with(lane, None);
         true
+    }
+
+    /// Lands at all crossings that are certain.
+    #[inline(always)]
+    fn land_all(&mut self) {
+        if self.guesses.iter().all(Option::is_none) {
+            return;
+        }
+        let patch = self.problems[0].patch();
+        let (a, b) = (
+            land_four::<L::Quad>(
+                &patch,
+                self.frames.first_chunk().unwrap(),
+                self.guesses.first_chunk().unwrap(),
+            ),
+            land_four::<L::Quad>(
+                &patch,
+                self.frames.last_chunk().unwrap(),
+                self.guesses.last_chunk().unwrap(),
+            ),
+        );
+        for lane in 0..LANES {
+            if self.guesses[lane].is_none() {
+                continue;
+            }
+            let (problem, landed) = (&self.problems[lane], [a, b][lane / 4][lane % 4]);
+            self.found[lane] = match landed {
+                Some(landed) => problem.accepts(landed.t).then_some(landed),
+                None => L::outline(Search {
+                    problem,
+                    frame: &self.frames[lane],
+                }),
+            };
+        }
     }
 
     /// Ends a lane.

@@ -2,11 +2,15 @@
 //!
 //! Most hits are in the middle of a cell and of a prism, where signs that f32 vouches for leave nothing to decide: what is asked
 //! is where the hit is. Seen along the ray, S(u, v) has two lateral coordinates, and both are 0 at the hit: Newton's method in (u, v)
-//! from a guess that is a hundredth of a texel off or less. Depth comes with its last step. What does not land in a few
-//! steps, and between the ray parameters where the crossing was seen, is searched by its signs.
+//! from a guess that is a hundredth of a texel off or less. On the way only these two are looked at ([`Seen`]), of one ray or of four that
+//! meet the same prism; where no step is left worth taking, S in space confirms it, and gives depth and normal. What does not land in
+//! a few steps, and between the ray parameters where the crossing was seen, is searched by its signs.
+
+use glam::{DVec2, DVec3};
 
 use crate::prism::ray_frame::RayFrame;
-use crate::surface::Patch;
+use crate::prism::simd::{Quad, Real};
+use crate::surface::{DisplacementMap, Patch};
 
 use super::Found;
 
@@ -21,49 +25,258 @@ pub struct Guess {
     pub above: bool,
 }
 
+/// Steps of Newton's method before the last.
+const MOST_STEPS: usize = 5;
+
 /// The hit near a guess, with its normal.
 #[inline(always)]
 pub fn land(patch: &Patch<'_>, frame: &RayFrame, guess: &Guess) -> Option<Found> {
-    const MOST_STEPS: usize = 6;
-    // Barycentrics, and texels: where the normal is taken.
-    const FINE: f64 = 1e-11;
-    const FINE_TEXELS: f64 = 1e-10;
-    // What the last step, taken from there, may find missing: Newton's error is about the square of its step, so that nothing that
-    // single precision sees depends on the guess.
-    const BEYOND: f64 = 100.0;
-    let ([x, y, z], [shear_x, shear_y]) = (frame.axes, frame.shear);
-    let [a, b, c] = patch.texels;
-    let texels = ((b - a).abs() + (c - a).abs()).max_element();
-    let fine = FINE.min(FINE_TEXELS / texels);
-    let [mut u, mut v] = guess.uv;
-    let (mut last_step, mut is_there) = (0.0, false);
+    let RayFrame { origin, shear, .. } = *frame;
+    let seen = Seen::new(patch, frame.axes, origin, shear);
+    let mut way = Way::new(patch, guess.uv);
     for _ in 0..MOST_STEPS {
+        way.go(seen.step(way.uv));
+        if way.is_there {
+            return way.confirmed(patch, frame, guess);
+        }
+    }
+    None
+}
+
+/// The hits of up to four rays with the same axes near their guesses, each as if it were alone.
+#[inline(always)]
+pub fn land_four<Q: Quad>(
+    patch: &Patch<'_>,
+    frames: &[RayFrame; 4],
+    guesses: &[Option<Guess>; 4],
+) -> [Option<Found>; 4] {
+    let mut found = [None; 4];
+    let Some(some) = guesses.iter().find_map(|guess| *guess) else {
+        return found;
+    };
+    let [f0, f1, f2, f3] = frames;
+    let (mut origin, mut shear) = ([Q::splat(0.0); 3], [Q::splat(0.0); 2]);
+    for k in 0..3 {
+        origin[k] = Q::from_array([f0.origin[k], f1.origin[k], f2.origin[k], f3.origin[k]]);
+    }
+    for k in 0..2 {
+        shear[k] = Q::from_array([f0.shear[k], f1.shear[k], f2.shear[k], f3.shear[k]]);
+    }
+    let seen = Seen::new(patch, f0.axes, origin, shear);
+    let mut ways = [Way::new(patch, some.uv); 4];
+    let mut going = 0u32;
+    for k in 0..4 {
+        if let Some(guess) = guesses[k] {
+            ways[k].uv = guess.uv;
+            going |= 1 << k;
+        }
+    }
+    for _ in 0..MOST_STEPS {
+        let [w0, w1, w2, w3] = &ways;
+        let [step_u, step_v] = seen.step([
+            Q::from_array([w0.uv[0], w1.uv[0], w2.uv[0], w3.uv[0]]),
+            Q::from_array([w0.uv[1], w1.uv[1], w2.uv[1], w3.uv[1]]),
+        ]);
+        let (step_u, step_v) = (step_u.to_array(), step_v.to_array());
+        for k in 0..4 {
+            if going >> k & 1 != 0 {
+                ways[k].go([step_u[k], step_v[k]]);
+                going &= !(u32::from(ways[k].is_there) << k);
+            }
+        }
+        if going == 0 {
+            break;
+        }
+    }
+    for k in 0..4 {
+        if let Some(guess) = &guesses[k]
+            && ways[k].is_there
+        {
+            found[k] = ways[k].confirmed(patch, &frames[k], guess);
+        }
+    }
+    found
+}
+
+/// One ray's way to its hit.
+#[derive(Clone, Copy)]
+struct Way {
+    uv: [f64; 2],
+    last_step: f64,
+    /// What may be left of the way where it ends, barycentrics.
+    fine: f64,
+    is_there: bool,
+}
+
+impl Way {
+    #[inline(always)]
+    fn new(patch: &Patch<'_>, uv: [f64; 2]) -> Self {
+        // Barycentrics, and texels: where the normal is taken.
+        const FINE: f64 = 1e-11;
+        const FINE_TEXELS: f64 = 1e-10;
+        let [a, b, c] = patch.texels;
+        let texels = ((b - a).abs() + (c - a).abs()).max_element();
+        Self {
+            uv,
+            last_step: 0.0,
+            fine: FINE.min(FINE_TEXELS / texels),
+            is_there: false,
+        }
+    }
+
+    #[inline(always)]
+    fn go(&mut self, [u, v]: [f64; 2]) {
+        self.uv = [self.uv[0] + u, self.uv[1] + v];
+        let step = u.abs().max(v.abs());
+        // What is left is to this step's square as this step is to the square of the last.
+        let ratio = step / self.last_step;
+        let left = step * (4.0 * ratio * ratio).min(1.0);
+        (self.last_step, self.is_there) = (step, left <= self.fine);
+    }
+
+    /// The hit, if S in space is there too: a line between texels may lie between the last two steps.
+    #[inline(always)]
+    fn confirmed(&self, patch: &Patch<'_>, frame: &RayFrame, guess: &Guess) -> Option<Found> {
+        // What the last step may find missing: Newton's error is about the square of its step, so that nothing that
+        // single precision sees depends on the guess.
+        const BEYOND: f64 = 100.0;
+        let ([x, y, z], [shear_x, shear_y]) = (frame.axes, frame.shear);
+        let [u, v] = self.uv;
         let point = patch.point(u, v);
         let (du, dv) = (point.du, point.dv);
         let depth = point.position[z] - frame.origin[2];
         let miss_x = frame.origin[0] + depth * shear_x - point.position[x];
         let miss_y = frame.origin[1] + depth * shear_y - point.position[y];
-        let (xu, xv) = (du[x] - shear_x * du[z], dv[x] - shear_x * dv[z]);
-        let (yu, yv) = (du[y] - shear_y * du[z], dv[y] - shear_y * dv[z]);
-        let inverse = 1.0 / (xu * yv - xv * yu);
-        let step_u = (miss_x * yv - miss_y * xv) * inverse;
-        let step_v = (miss_y * xu - miss_x * yu) * inverse;
-        (u, v) = (u + step_u, v + step_v);
-        let step = step_u.abs().max(step_v.abs());
-        if is_there && step <= BEYOND * fine {
-            let t = (depth + step_u * du[z] + step_v * dv[z]) * frame.per_depth;
-            let is_between = t >= guess.t[0] && t <= guess.t[1];
-            return is_between.then_some(Found {
-                t,
-                u,
-                v,
-                above: guess.above,
-                ng: Some(point.ng),
-            });
-        }
-        // What is left is to this step's square as this step is to the square of the last.
-        let left = step * (4.0 * (step / last_step).powi(2)).min(1.0);
-        (last_step, is_there) = (step, left <= fine);
+        let [step_u, step_v] = newton(
+            [miss_x, miss_y],
+            [du[x] - shear_x * du[z], du[y] - shear_y * du[z]],
+            [dv[x] - shear_x * dv[z], dv[y] - shear_y * dv[z]],
+        );
+        let t = (depth + step_u * du[z] + step_v * dv[z]) * frame.per_depth;
+        let is_there = step_u.abs().max(step_v.abs()) <= BEYOND * self.fine;
+        (is_there && t >= guess.t[0] && t <= guess.t[1]).then_some(Found {
+            t,
+            u: u + step_u,
+            v: v + step_v,
+            above: guess.above,
+            ng: Some(point.ng),
+        })
     }
-    None
+}
+
+/// A prism seen along rays, one lane each: where S(u, v) is beside them.
+///
+/// Lateral coordinates of P + D N'/|N'| are linear in those of the corners' vertices and normals, with k = D/|N'| alone to be found for
+/// every (u, v); |N'|^2 is a quadratic.
+struct Seen<'m, R> {
+    map: &'m DisplacementMap,
+    scale: R,
+    midlevel: R,
+    /// At vertex 0, and what u and v add: texel coordinates, lateral coordinates of the vertices and of their normals.
+    texels: [[R; 2]; 3],
+    vertices: [[R; 2]; 3],
+    normals: [[R; 2]; 3],
+    /// The products of n_0, n_1 - n_0 and n_2 - n_0: 00, 01, 02, 11, 12, 22.
+    products: [R; 6],
+}
+
+impl<'m, R: Real> Seen<'m, R> {
+    #[inline(always)]
+    fn new(patch: &Patch<'m>, axes: [usize; 3], origin: [R; 3], shear: [R; 2]) -> Self {
+        let ([v0, v1, v2], [n0, n1, n2]) = (patch.vertices, patch.normals);
+        let [t0, t1, t2] = patch.texels;
+        let (m1, m2) = (n1 - n0, n2 - n0);
+        let [x, y, z] = along::<R>(v0, axes);
+        Self {
+            map: patch.map,
+            scale: R::splat(patch.scale),
+            midlevel: R::splat(patch.midlevel),
+            texels: [splat2(t0), splat2(t1 - t0), splat2(t2 - t0)],
+            vertices: [
+                lateral([x - origin[0], y - origin[1], z - origin[2]], shear),
+                lateral(along(v1 - v0, axes), shear),
+                lateral(along(v2 - v0, axes), shear),
+            ],
+            normals: [
+                lateral(along(n0, axes), shear),
+                lateral(along(m1, axes), shear),
+                lateral(along(m2, axes), shear),
+            ],
+            products: [
+                R::splat(n0.dot(n0)),
+                R::splat(n0.dot(m1)),
+                R::splat(n0.dot(m2)),
+                R::splat(m1.dot(m1)),
+                R::splat(m1.dot(m2)),
+                R::splat(m2.dot(m2)),
+            ],
+        }
+    }
+
+    /// Newton's step to where S is on the ray.
+    #[inline(always)]
+    fn step(&self, uv: [R; 2]) -> [R; 2] {
+        let [height, gradient_x, gradient_y] = R::sampled(self.map, both(&self.texels, uv));
+        let [c00, c01, c02, c11, c12, c22] = self.products;
+        // N' . dN'/du, N' . dN'/dv, |N'|^2.
+        let (turn_u, turn_v) = (linear([c01, c11, c12], uv), linear([c02, c12, c22], uv));
+        let squared = linear([linear([c00, c01, c02], uv), turn_u, turn_v], uv);
+        let per_squared = R::splat(1.0) / squared;
+        let per_length = per_squared.sqrt();
+        let [_, [x1, y1], [x2, y2]] = self.texels;
+        let per_height = self.scale * per_length;
+        let k = (height - self.midlevel) * per_height;
+        let turned = k * per_squared;
+        let k_u = (gradient_x * x1 + gradient_y * y1) * per_height - turned * turn_u;
+        let k_v = (gradient_x * x2 + gradient_y * y2) * per_height - turned * turn_v;
+        let ([px, py], [nx, ny]) = (both(&self.vertices, uv), both(&self.normals, uv));
+        let [_, [vux, vuy], [vvx, vvy]] = self.vertices;
+        let [_, [nux, nuy], [nvx, nvy]] = self.normals;
+        let zero = R::splat(0.0);
+        newton(
+            [zero - (px + k * nx), zero - (py + k * ny)],
+            [vux + k * nux + k_u * nx, vuy + k * nuy + k_u * ny],
+            [vvx + k * nvx + k_v * nx, vvy + k * nvy + k_v * ny],
+        )
+    }
+}
+
+/// c0 + c1 u + c2 v.
+#[inline(always)]
+fn linear<R: Real>([c0, c1, c2]: [R; 3], [u, v]: [R; 2]) -> R {
+    c0 + u * c1 + v * c2
+}
+
+#[inline(always)]
+fn both<R: Real>([c0, c1, c2]: &[[R; 2]; 3], uv: [R; 2]) -> [R; 2] {
+    [
+        linear([c0[0], c1[0], c2[0]], uv),
+        linear([c0[1], c1[1], c2[1]], uv),
+    ]
+}
+
+/// What of a vector is beside a ray.
+#[inline(always)]
+fn lateral<R: Real>([x, y, z]: [R; 3], shear: [R; 2]) -> [R; 2] {
+    [x - z * shear[0], y - z * shear[1]]
+}
+
+#[inline(always)]
+fn along<R: Real>(p: DVec3, [x, y, z]: [usize; 3]) -> [R; 3] {
+    [R::splat(p[x]), R::splat(p[y]), R::splat(p[z])]
+}
+
+#[inline(always)]
+fn splat2<R: Real>(p: DVec2) -> [R; 2] {
+    [R::splat(p.x), R::splat(p.y)]
+}
+
+/// The step (u, v) whose parts along `du` and `dv` make `miss`.
+#[inline(always)]
+fn newton<R: Real>(miss: [R; 2], du: [R; 2], dv: [R; 2]) -> [R; 2] {
+    let inverse = R::splat(1.0) / (du[0] * dv[1] - dv[0] * du[1]);
+    [
+        (miss[0] * dv[1] - miss[1] * dv[0]) * inverse,
+        (miss[1] * du[0] - miss[0] * du[1]) * inverse,
+    ]
 }

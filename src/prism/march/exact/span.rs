@@ -308,7 +308,7 @@ impl<'a> Walker<'a> {
         }
     }
 
-    /// Whether level of detail ends the search here.
+    /// Whether the search ends here: because any crossing will do and there is one, or by level of detail.
     #[inline(always)]
     fn settles<Q: Quad>(
         &self,
@@ -317,7 +317,30 @@ impl<'a> Walker<'a> {
         span: [f32; 2],
         signs: &mut Signs<'_, Q>,
     ) -> bool {
+        if signs.any_will_do() && self.surely_crosses(ends, span) {
+            signs.found_any();
+            return true;
+        }
         self.problem.spread > 0.0 && lod::settle(self, ends, alive, span, signs)
+    }
+
+    /// Whether the ray surely changes sides among the children of a span: some are wholly above the surface and some wholly below it, and
+    /// all between two such is surely inside the prism and the ray's interval.
+    #[inline(always)]
+    fn surely_crosses(&self, ends: &Ends, span: [f32; 2]) -> bool {
+        let all = (1 << ends.children) - 1;
+        let (above, below) = (ends.above & all, ends.below & all);
+        if above == 0 || below == 0 {
+            return false;
+        }
+        let (first_above, first_below) = (above.trailing_zeros(), below.trailing_zeros());
+        let (before, first) = match first_above < first_below {
+            true => (above, first_below),
+            false => (below, first_above),
+        };
+        let last_before = u32::BITS - (before & ((1 << first) - 1)).leading_zeros();
+        let [from, to] = [last_before, first].map(|child| at(span, child as usize, ends.children));
+        from < to && self.surely_within(from, to).is_some()
     }
 
     /// How far the boxes of a span's children go beyond their ends, and the level of the pyramid whose blocks hold them.
