@@ -59,7 +59,7 @@ pub(crate) struct LevelRows {
     /// 1 / B.
     pub per_block: [f32; Self::MOST],
     /// The last block of a row, and the last row.
-    pub last: [[f32; Self::MOST]; 2],
+    pub last: [[u32; Self::MOST]; 2],
     pub width: [u32; Self::MOST],
     pub offset: [u32; Self::MOST],
 }
@@ -70,16 +70,13 @@ impl LevelRows {
     fn new(levels: &[Level]) -> Self {
         assert!(levels.len() <= Self::MOST, "a map of too many levels");
         let of = |k: usize| &levels[k.min(levels.len() - 1)];
-        let row = |value: fn(&Level) -> f32| std::array::from_fn(|k| value(of(k)));
+        let row = |value: fn(&Level) -> usize| std::array::from_fn(|k| value(of(k)) as u32);
         Self {
             count: levels.len(),
-            per_block: row(|level| 1.0 / (1u32 << level.shift) as f32),
-            last: [
-                row(|level| (level.width - 1) as f32),
-                row(|level| (level.height - 1) as f32),
-            ],
-            width: std::array::from_fn(|k| of(k).width as u32),
-            offset: std::array::from_fn(|k| of(k).offset as u32),
+            per_block: std::array::from_fn(|k| 1.0 / (1u32 << of(k).shift) as f32),
+            last: [row(|level| level.width - 1), row(|level| level.height - 1)],
+            width: row(|level| level.width),
+            offset: row(|level| level.offset),
         }
     }
 }
@@ -120,11 +117,6 @@ impl Level {
     fn index(&self, i: usize, j: usize) -> usize {
         assert!(i < self.width && j < self.height, "block outside the map");
         self.offset + j * self.width + i
-    }
-
-    /// Where the level's pairs begin among these.
-    pub(crate) fn offset(&self) -> usize {
-        self.offset
     }
 }
 

@@ -12,7 +12,7 @@ use std::ops::{Add, Div, Mul, Sub};
 use std::sync::atomic::AtomicU32;
 
 use super::{Grid, LANES, Lanes, Task};
-use crate::surface::{Entries, Level, StoredTexels};
+use crate::surface::{Entries, StoredTexels};
 
 #[derive(Clone, Copy)]
 pub struct Avx2(__m256);
@@ -173,21 +173,29 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn block_ranges(level: &Level, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
-        // SAFETY: AVX2 is there. Moved inside, 0 <= i < width and 0 <= j < height, so the four are stored pairs of the level.
+    fn block_ranges(grid: &Grid<'_>, level: usize, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
+        let rows = grid.rows;
+        // SAFETY: AVX2 is there. Moved inside, 0 <= i < width and 0 <= j < height, so the four are stored pairs of the level: rows
+        // beyond the last level repeat it.
         unsafe {
-            let last_i = _mm256_set1_epi32(level.width() as i32 - 1);
-            let last_j = _mm256_set1_epi32(level.height() as i32 - 1);
+            let last_i = _mm256_set1_epi32(rows.last[0][level] as i32);
+            let last_j = _mm256_set1_epi32(rows.last[1][level] as i32);
             let i = [whole(i[0], last_i), whole(i[1], last_i)];
             let j = [whole(j[0], last_j), whole(j[1], last_j)];
-            let width = _mm256_set1_epi32(level.width() as i32);
-            let offset = _mm256_set1_epi32(level.offset() as i32);
-            of_blocks(level.entries(), i, j, width, offset)
+            let width = _mm256_set1_epi32(rows.width[level] as i32);
+            let offset = _mm256_set1_epi32(rows.offset[level] as i32);
+            of_blocks(grid.levels[0].entries(), i, j, width, offset)
         }
     }
 
     #[inline(always)]
-    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: [Self; 2], y: [Self; 2]) -> [Self; 2] {
+    fn block_ranges_by_size(
+        grid: &Grid<'_>,
+        is_inside: bool,
+        size: Self,
+        x: [Self; 2],
+        y: [Self; 2],
+    ) -> [Self; 2] {
         let rows = grid.rows;
         // SAFETY: AVX2 is there. The level is one of the pyramid's, and the blocks are moved inside it, so they are stored
         // pairs: rows beyond the last level repeat it.
@@ -198,12 +206,13 @@ impl Lanes for Avx2 {
             let last = _mm256_set1_epi32(rows.count as i32 - 1);
             let level = _mm256_min_epi32(_mm256_max_epi32(level, _mm256_setzero_si256()), last);
             let per_block = Self(looked_up(rows.per_block.as_ptr().cast(), level));
-            let last_i = Self(looked_up(rows.last[0].as_ptr().cast(), level));
-            let last_j = Self(looked_up(rows.last[1].as_ptr().cast(), level));
-            let end_i = grid.within((x[1] * per_block).floor(), last_i);
-            let end_j = grid.within((y[1] * per_block).floor(), last_j);
-            let last_i = _mm256_cvttps_epi32(last_i.0);
-            let last_j = _mm256_cvttps_epi32(last_j.0);
+            let last_i = _mm256_castps_si256(looked_up(rows.last[0].as_ptr().cast(), level));
+            let last_j = _mm256_castps_si256(looked_up(rows.last[1].as_ptr().cast(), level));
+            let (mut end_i, mut end_j) = (x[1] * per_block, y[1] * per_block);
+            if !is_inside {
+                end_i = grid.within(end_i.floor(), Self(_mm256_cvtepi32_ps(last_i)));
+                end_j = grid.within(end_j.floor(), Self(_mm256_cvtepi32_ps(last_j)));
+            }
             let i = [whole(x[0] * per_block, last_i), whole(end_i, last_i)];
             let j = [whole(y[0] * per_block, last_j), whole(end_j, last_j)];
             let width = _mm256_castps_si256(looked_up(rows.width.as_ptr().cast(), level));

@@ -114,10 +114,16 @@ pub(crate) trait Lanes:
     fn sign_mask(self) -> u32;
     /// Smallest and largest stored texel of four blocks of a level in the columns and rows in which i and j are, in blocks. The second
     /// column is the first, the next, or one before. What is outside the level, and NaN, is moved inside first.
-    fn block_ranges(level: &Level, i: [Self; 2], j: [Self; 2]) -> [Self; 2];
-    /// The same of the blocks in which boxes from (x, y) to (x, y), folded at their low end only, begin and end, each on the finest
-    /// level whose blocks are larger than `size`. Sizes and corners are from 0 to 2^24; others are moved there.
-    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: [Self; 2], y: [Self; 2]) -> [Self; 2];
+    fn block_ranges(grid: &Grid<'_>, level: usize, i: [Self; 2], j: [Self; 2]) -> [Self; 2];
+    /// The same of the blocks in which boxes from (x, y) to (x, y), folded at their low end only where not all are inside the map, begin
+    /// and end, each on the finest level whose blocks are larger than `size`. Sizes and corners are from 0 to 2^24; others are moved there.
+    fn block_ranges_by_size(
+        grid: &Grid<'_>,
+        is_inside: bool,
+        size: Self,
+        x: [Self; 2],
+        y: [Self; 2],
+    ) -> [Self; 2];
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), integers in float lanes.
     /// Cells outside the grid, and NaN, are moved inside first.
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4];
@@ -179,34 +185,35 @@ impl<'m> Grid<'m> {
     /// The finest level of the pyramid whose blocks are at least `size` texels wide.
     #[inline(always)]
     pub fn level(&self, size: f32) -> usize {
-        // Blocks of level l are 4 << l wide.
-        let bits = 32 - (size as u32).leading_zeros() as usize;
-        bits.saturating_sub(2).min(self.levels.len() - 1)
+        // Blocks of level l are 4 << l wide: the exponent, 129 for sizes from 4 to 8.
+        let exponent = (size.abs().to_bits() >> 23) as usize;
+        exponent.saturating_sub(128).min(self.rows.count - 1)
     }
 
     /// Smallest and largest stored texel around boxes of texel coordinates ([low, high] in x and in y) no larger than a
     /// block of the level.
     #[inline(always)]
     pub fn block_range<L: Lanes>(&self, level: usize, x: [L; 2], y: [L; 2]) -> [L; 2] {
-        let level = &self.levels[level];
-        let per_block = L::splat(1.0 / (1u32 << level.shift()) as f32);
+        let level = level % LevelRows::MOST;
+        let per_block = L::splat(self.rows.per_block[level]);
         let is_inside = self.is_inside(x, y);
         let (x, y) = self.folded_boxes(is_inside, x, y);
         let mut i = [x[0] * per_block, x[1] * per_block];
         let mut j = [y[0] * per_block, y[1] * per_block];
         if !is_inside {
-            let last = [level.width(), level.height()].map(|blocks| (blocks - 1) as f32);
-            i[1] = self.within(i[1].floor(), L::splat(last[0]));
-            j[1] = self.within(j[1].floor(), L::splat(last[1]));
+            let [last_i, last_j] = [0, 1].map(|axis| self.rows.last[axis][level] as f32);
+            i[1] = self.within(i[1].floor(), L::splat(last_i));
+            j[1] = self.within(j[1].floor(), L::splat(last_j));
         }
-        L::block_ranges(level, i, j)
+        L::block_ranges(self, level, i, j)
     }
 
     /// The same where every lane has its own size of box.
     #[inline(always)]
     pub fn block_ranges<L: Lanes>(&self, size: L, x: [L; 2], y: [L; 2]) -> [L; 2] {
-        let (x, y) = self.folded_boxes(self.is_inside(x, y), x, y);
-        L::block_ranges_by_size(self, size, x, y)
+        let is_inside = self.is_inside(x, y);
+        let (x, y) = self.folded_boxes(is_inside, x, y);
+        L::block_ranges_by_size(self, is_inside, size, x, y)
     }
 
     /// Whether boxes lie between the first and the last texels, where no wrap mode changes anything: so almost all do.

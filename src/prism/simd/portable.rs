@@ -136,16 +136,23 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     }
 
     #[inline(always)]
-    fn block_ranges(level: &Level, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
+    fn block_ranges(grid: &Grid<'_>, level: usize, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
         if COUNTED {
             steps::count();
         }
         let (i, j) = (i.map(Self::to_array), j.map(Self::to_array));
+        let level = &grid.levels[level];
         of_blocks(|l| (level, i.map(|i| i[l]), j.map(|j| j[l])))
     }
 
     #[inline(always)]
-    fn block_ranges_by_size(grid: &Grid<'_>, size: Self, x: [Self; 2], y: [Self; 2]) -> [Self; 2] {
+    fn block_ranges_by_size(
+        grid: &Grid<'_>,
+        is_inside: bool,
+        size: Self,
+        x: [Self; 2],
+        y: [Self; 2],
+    ) -> [Self; 2] {
         if COUNTED {
             steps::count();
         }
@@ -155,16 +162,12 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
             Self::from_array(std::array::from_fn(|l| value(level(l))))
         };
         let per_block = row(&|level| 1.0 / (1u32 << level.shift()) as f32);
-        let [first, end] = x.map(|x| (x * per_block).floor());
-        let i = [
-            first,
-            grid.within(end, row(&|level| (level.width() - 1) as f32)),
-        ];
-        let [first, end] = y.map(|y| (y * per_block).floor());
-        let j = [
-            first,
-            grid.within(end, row(&|level| (level.height() - 1) as f32)),
-        ];
+        let mut i = x.map(|x| x * per_block);
+        let mut j = y.map(|y| y * per_block);
+        if !is_inside {
+            i[1] = grid.within(i[1].floor(), row(&|level| (level.width() - 1) as f32));
+            j[1] = grid.within(j[1].floor(), row(&|level| (level.height() - 1) as f32));
+        }
         let (i, j) = (i.map(Self::to_array), j.map(Self::to_array));
         of_blocks(|l| (level(l), i.map(|i| i[l]), j.map(|j| j[l])))
     }

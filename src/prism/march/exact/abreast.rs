@@ -285,34 +285,24 @@ impl<'a, L: Lanes> Team<'a, L> {
     /// Lands at all crossings that are certain.
     #[inline(always)]
     fn land_all(&mut self) {
-        if self.guesses.iter().all(Option::is_none) {
-            return;
-        }
         let patch = self.problems[0].patch();
-        let (a, b) = (
-            land_four::<L::Quad>(
-                &patch,
-                self.frames.first_chunk().unwrap(),
-                self.guesses.first_chunk().unwrap(),
-            ),
-            land_four::<L::Quad>(
-                &patch,
-                self.frames.last_chunk().unwrap(),
-                self.guesses.last_chunk().unwrap(),
-            ),
-        );
-        for lane in 0..LANES {
-            if self.guesses[lane].is_none() {
-                continue;
+        let (frames, guesses) = (self.frames.as_chunks().0, self.guesses.as_chunks().0);
+        for half in 0..LANES / 4 {
+            let landed = land_four::<L::Quad>(&patch, &frames[half], &guesses[half]);
+            for k in 0..4 {
+                let lane = 4 * half + k;
+                if self.guesses[lane].is_none() {
+                    continue;
+                }
+                let problem = &self.problems[lane];
+                self.found[lane] = match landed[k] {
+                    Some(landed) => problem.accepts(landed.t).then_some(landed),
+                    None => L::outline(Search {
+                        problem,
+                        frame: &self.frames[lane],
+                    }),
+                };
             }
-            let (problem, landed) = (&self.problems[lane], [a, b][lane / 4][lane % 4]);
-            self.found[lane] = match landed {
-                Some(landed) => problem.accepts(landed.t).then_some(landed),
-                None => L::outline(Search {
-                    problem,
-                    frame: &self.frames[lane],
-                }),
-            };
         }
     }
 

@@ -60,12 +60,18 @@ impl Stack {
 
 /// Where child k of a span that was cut into `count` begins.
 #[inline(always)]
-pub fn at([from, to]: [f32; 2], k: usize, count: usize) -> f32 {
+pub fn at(span: [f32; 2], k: usize, count: usize) -> f32 {
     if k == count {
-        to
+        span[1]
     } else {
-        from + (to - from) * (k as f32 / count as f32)
+        span[0] + length(span, count) * k as f32
     }
+}
+
+/// How long each child of a span that was cut into `count`, 7 or 15, is.
+#[inline(always)]
+pub fn length([from, to]: [f32; 2], count: usize) -> f32 {
+    (to - from) * if count < LANES { 1.0 / 7.0 } else { 1.0 / 15.0 }
 }
 
 /// One number for each end of up to 15 children.

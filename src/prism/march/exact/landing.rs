@@ -55,13 +55,18 @@ pub fn land_four<Q: Quad>(
         return found;
     };
     let [f0, f1, f2, f3] = frames;
-    let (mut origin, mut shear) = ([Q::splat(0.0); 3], [Q::splat(0.0); 2]);
-    for k in 0..3 {
-        origin[k] = Q::from_array([f0.origin[k], f1.origin[k], f2.origin[k], f3.origin[k]]);
-    }
-    for k in 0..2 {
-        shear[k] = Q::from_array([f0.shear[k], f1.shear[k], f2.shear[k], f3.shear[k]]);
-    }
+    let [[x0, y0, z0], [x1, y1, z1]] = [f0.origin, f1.origin];
+    let [[x2, y2, z2], [x3, y3, z3]] = [f2.origin, f3.origin];
+    let origin = [
+        Q::from_array([x0, x1, x2, x3]),
+        Q::from_array([y0, y1, y2, y3]),
+        Q::from_array([z0, z1, z2, z3]),
+    ];
+    let [[s0, t0], [s1, t1], [s2, t2], [s3, t3]] = [f0.shear, f1.shear, f2.shear, f3.shear];
+    let shear = [
+        Q::from_array([s0, s1, s2, s3]),
+        Q::from_array([t0, t1, t2, t3]),
+    ];
     let seen = Seen::new(patch, f0.axes, origin, shear);
     let mut ways = [Way::new(patch, some.uv); 4];
     let mut going = 0u32;
@@ -279,4 +284,90 @@ fn newton<R: Real>(miss: [R; 2], du: [R; 2], dv: [R; 2]) -> [R; 2] {
         (miss[0] * dv[1] - miss[1] * dv[0]) * inverse,
         (miss[1] * du[0] - miss[0] * du[1]) * inverse,
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prism::ray_frame::axes;
+    use crate::prism::simd::{Lanes, Portable};
+    use crate::ray::Ray;
+    use crate::surface::{Texels, Wrap};
+
+    fn bumps() -> DisplacementMap {
+        let heights = (0..64u32 * 64).map(|i| (i.wrapping_mul(2654435761) >> 24) as u8);
+        DisplacementMap::new(64, 64, Texels::U8(heights.collect()), Wrap::Repeat).unwrap()
+    }
+
+    fn patch(map: &DisplacementMap) -> Patch<'_> {
+        let tip = |x: f64, y: f64| DVec3::new(x, y, 3.0).normalize();
+        Patch {
+            vertices: [
+                DVec3::ZERO,
+                DVec3::new(1.0, 0.1, 0.0),
+                DVec3::new(0.2, 0.9, 0.1),
+            ],
+            normals: [tip(-1.0, -0.5), tip(1.0, 0.0), tip(0.0, 1.0)],
+            texels: [
+                DVec2::new(3.0, 5.0),
+                DVec2::new(40.0, 9.0),
+                DVec2::new(8.0, 50.0),
+            ],
+            map,
+            scale: 0.01,
+            midlevel: 0.5,
+        }
+    }
+
+    /// A ray from above to the point (u, v) of S, and a guess that is a hundredth of a texel off.
+    fn aimed(patch: &Patch<'_>, u: f64, v: f64) -> (RayFrame, Guess) {
+        let to = patch.point(u, v).position;
+        let from = DVec3::new(0.7, -0.4, 2.0).as_vec3();
+        let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3());
+        let guess = Guess {
+            uv: [u + 2e-4, v - 1e-4],
+            t: [0.5, 1.5],
+            above: true,
+        };
+        (RayFrame::new(&ray, axes(&ray)), guess)
+    }
+
+    fn four_land_as_each_alone<L: Lanes>() {
+        let map = bumps();
+        let patch = patch(&map);
+        let mut landed = 0;
+        for k in 0..200u32 {
+            let along = |salt: u32| f64::from((4 * k + salt).wrapping_mul(40503) % 4096) / 8192.0;
+            let aims = [0, 1, 2, 3].map(|lane| aimed(&patch, along(lane), along(lane + 9)));
+            let mut guesses = aims.map(|(_, guess)| Some(guess));
+            guesses[k as usize % 4] = None;
+            let frames = aims.map(|(frame, _)| frame);
+            let found = land_four::<L::Quad>(&patch, &frames, &guesses);
+            for lane in 0..4 {
+                let alone = guesses[lane].and_then(|guess| land(&patch, &frames[lane], &guess));
+                let bits = |found: Option<Found>| {
+                    found.map(|found| [found.t, found.u, found.v].map(f64::to_bits))
+                };
+                assert_eq!(bits(found[lane]), bits(alone), "{k} {lane}");
+                let Some(found) = alone else { continue };
+                landed += 1;
+                assert!((found.t - 1.0).abs() < 1e-6 && found.ng.is_some());
+            }
+        }
+        // A few cross a line between texels.
+        assert!(landed > 500, "{landed} of 600");
+    }
+
+    #[test]
+    fn baseline() {
+        four_land_as_each_alone::<Portable>();
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn avx2() {
+        if crate::prism::simd::SimdLevel::Avx2.is_supported() {
+            four_land_as_each_alone::<crate::prism::simd::Avx2>();
+        }
+    }
 }

@@ -10,7 +10,7 @@ mod record;
 use super::Problem;
 use super::arcs::Arcs;
 use super::cells::{Chord, MOST_CELLS, Off};
-use super::children::{Ends, Stack, at, of};
+use super::children::{Ends, Stack, at, length, of};
 use super::landing::Guess;
 use super::lod;
 use super::signs::{Side, Signs};
@@ -345,9 +345,9 @@ impl<'a> Walker<'a> {
 
     /// How far the boxes of a span's children go beyond their ends, and the level of the pyramid whose blocks hold them.
     #[inline(always)]
-    fn boxes(&self, children: usize, [from, to]: [f32; 2]) -> (f32, usize) {
+    fn boxes(&self, children: usize, span: [f32; 2]) -> (f32, usize) {
         let l = self.lane;
-        let ds = (to - from) / children as f32;
+        let ds = length(span, children);
         let [x, y] = self.base;
         let off = self.arcs.bend[l] * ds * ds
             + self.arcs.rounding[l]
@@ -357,13 +357,13 @@ impl<'a> Walker<'a> {
     }
 
     #[inline(always)]
-    fn cut_into<L: Lanes, const R: usize>(&self, [from, to]: [f32; 2]) -> (u32, Ends) {
+    fn cut_into<L: Lanes, const R: usize>(&self, span: [f32; 2]) -> (u32, Ends) {
         let l = self.lane;
         let children = 8 * R - 1;
-        let ds = (to - from) / children as f32;
+        let ds = length(span, children);
         let height_off = self.arcs.height_bend[l] * ds * ds + self.arcs.height_rounding[l];
         let [base_x, base_y] = self.base;
-        let (box_off, level) = self.boxes(children, [from, to]);
+        let (box_off, level) = self.boxes(children, span);
 
         let zero = L::splat(0.0);
         let (mut x, mut y, mut h) = ([zero; R], [zero; R], [zero; R]);
@@ -376,7 +376,7 @@ impl<'a> Walker<'a> {
         for r in 0..R {
             let first = 8.0 * r as f32;
             let numbers = L::from_array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
-            let s = (numbers + L::splat(first)).mul_add(L::splat(ds), L::splat(from));
+            let s = (numbers + L::splat(first)).mul_add(L::splat(ds), L::splat(span[0]));
             [x[r], y[r], h[r]] = places.at(s, reference);
         }
         let (mut all_above, mut all_below) = (0, 0);
@@ -421,7 +421,7 @@ impl<'a> Walker<'a> {
         signs: &mut Signs<'_, L::Quad>,
     ) -> u32 {
         let l = self.lane;
-        let ds = (span[1] - span[0]) / ends.children as f32;
+        let ds = length(span, ends.children);
         let (bend, height_bend) = (self.arcs.bend[l], self.arcs.height_bend[l]);
         // f32 cannot tell the parts of such a span from one another: f64 looks at its ends.
         if span[1] - span[0] < SHORTEST {
