@@ -43,14 +43,19 @@ fn on_sphere([start, along_p, end, along_q]: [Vec3; 4], p: f32, q: f32) -> Vec3 
     flat.normalize()
 }
 
-/// Whole texels along a rhombus of a map of this size, and the first one of rhombus k.
+/// Whole texels along a rhombus of a map of this size.
+pub fn side(size: usize) -> usize {
+    size / 4 - 2 * BORDER - 2
+}
+
+/// The same, and the first texel of rhombus k.
 fn layout(size: usize) -> (f32, impl Fn(usize) -> Vec2) {
     let cell = size / 4;
     let start = move |k: usize| {
         let corner = [k % 4, k / 4].map(|i| (i * cell + BORDER) as f32);
         Vec2::from(corner)
     };
-    ((cell - 2 * BORDER - 2) as f32, start)
+    (side(size) as f32, start)
 }
 
 /// The sphere over a map of `size` x `size` texels, 20 `cells`^2 base triangles.
