@@ -12,6 +12,7 @@ pub mod cli;
 pub mod demo;
 #[cfg(feature = "embree")]
 pub mod embree;
+pub mod files;
 pub mod image;
 pub mod prism;
 pub mod ray;

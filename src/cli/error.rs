@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::interrupt::EXIT_BASE;
 use super::rays::RayError;
 use crate::demo::WriteDemoError;
-use crate::image::OutputError;
+use crate::files::OutputError;
 use crate::prism::MarchError;
 use crate::render::film::FrameError;
 use crate::scene::{AssetError, SceneError};

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use crate::image::{atomic, write_png_rgb8};
+use crate::files::output;
+use crate::image::write_png_rgb8;
 use crate::render::film::{Frame, FrameInfo};
 use crate::render::to_srgb8;
 use crate::scene::Film;
@@ -38,7 +39,7 @@ impl Target {
                 });
             }
         };
-        atomic::check(path)?;
+        output::check(path)?;
         Ok(Self {
             path: path.to_owned(),
             format,

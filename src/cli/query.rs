@@ -13,7 +13,8 @@ use super::hits;
 use super::march::MarchArgs;
 use super::parse;
 use super::rays::{Layout, RayError, RayReader, Row};
-use crate::image::{Channel, atomic};
+use crate::files::output;
+use crate::image::Channel;
 use crate::prism::PrismOptions;
 use crate::ray::Cone;
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
@@ -147,7 +148,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.check_backend()?;
     let to_stdout = args.output == Path::new("-");
     if !to_stdout {
-        atomic::check(&args.output)?;
+        output::check(&args.output)?;
     }
     args.engine.start_threads()?;
     let mut rays = RayReader::open(&args.rays)?;
@@ -173,7 +174,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         });
     }
     let mut because = None;
-    let written = atomic::write(&args.output, |out| {
+    let written = output::write(&args.output, |out| {
         query.run(&mut rays, out).map_err(|stop| match stop {
             Stop::Write(error) => error,
             Stop::Because(error) => {

@@ -2,12 +2,12 @@
 //!
 //! Numbers need no quotes, so a row is a line, and its number is the one that an editor shows.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 use thiserror::Error;
 
+use crate::files::input;
 use crate::ray::Ray;
 
 /// Columns that a table must have, then those it may have.
@@ -114,7 +114,7 @@ impl RayReader {
         let input: Box<dyn Read> = if path == Path::new("-") {
             Box::new(io::stdin())
         } else {
-            let opened = File::open(path).map_err(|source| RayError::Read {
+            let opened = input::open(path).map_err(|source| RayError::Read {
                 file: file.clone(),
                 source,
             })?;

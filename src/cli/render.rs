@@ -17,7 +17,7 @@ use super::parse;
 use super::picture::Target;
 use super::progress::Progress;
 use super::stats::{Clock, Seconds, Stats};
-use crate::image::atomic;
+use crate::files::output;
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
 use crate::render::{Control, Outcome, RenderInput};
 use crate::scene::{Aov, AovSet, Film, Integrator, Loaded, Scene, View};
@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     });
     let target = Target::new(&output)?;
     if let Some(stats) = &args.stats {
-        atomic::check(stats)?;
+        output::check(stats)?;
     }
     args.engine.start_threads()?;
     Job {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::memory::Memory;
-use crate::image::{OutputError, atomic};
+use crate::files::output::{self, OutputError};
 use crate::render::RayCounts;
 
 /// What `--stats` writes.
@@ -74,7 +74,7 @@ impl From<&RayCounts> for Rays {
 impl Stats {
     /// Writes all of it as JSON.
     pub fn write(&self, path: &Path) -> Result<(), OutputError> {
-        atomic::write(path, |file| {
+        output::write(path, |file| {
             serde_json::to_writer_pretty(&mut *file, self)?;
             writeln!(file)
         })

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::{Demo, DemoFiles};
-use crate::image::{OutputError, atomic, write_png_gray16, write_png_rgb8};
+use crate::files::output::{self, OutputError};
+use crate::image::{write_png_gray16, write_png_rgb8};
 use crate::surface::MeshBuilder;
 
 /// Half the side of the floor, a square at y = 0 around the origin.
@@ -43,7 +44,7 @@ impl Demo {
         let file = |ending: &str| folder.join(format!("{}{ending}", self.name));
         let scene = file(".toml");
         // Making the maps takes a while: an unwritable folder is found before.
-        atomic::check(&scene)?;
+        output::check(&scene)?;
         let files: DemoFiles = (self.make)(map_size);
         write_obj(&file(".obj"), &files.mesh)?;
         let size = files.map_size;
@@ -60,7 +61,7 @@ impl Demo {
         if files.scene.contains("floor.obj") {
             write_obj(&folder.join("floor.obj"), &floor())?;
         }
-        atomic::write(&scene, |out| out.write_all(files.scene.as_bytes()))?;
+        output::write(&scene, |out| out.write_all(files.scene.as_bytes()))?;
         Ok(scene)
     }
 }
@@ -82,7 +83,7 @@ fn floor() -> MeshBuilder {
 
 /// Writes a mesh as Wavefront OBJ: one `v`, `vt` and `vn` per vertex with one index for all three.
 fn write_obj(path: &Path, mesh: &MeshBuilder) -> Result<(), OutputError> {
-    atomic::write(path, |out| {
+    output::write(path, |out| {
         for p in &mesh.positions {
             writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
         }

@@ -6,6 +6,7 @@ use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use super::ImageError;
+use crate::files::input;
 
 /// A picture format that is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +64,7 @@ pub(super) fn open(path: &Path) -> Result<(Format, BufReader<File>), ImageError>
         path: path.to_owned(),
         source,
     };
-    let mut file = File::open(path).map_err(read_error)?;
+    let mut file = input::open(path).map_err(read_error)?;
     let mut start = Vec::with_capacity(SIGNATURE);
     (&mut file)
         .take(SIGNATURE as u64)

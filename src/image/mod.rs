@@ -6,7 +6,6 @@
 //! A file is refused from its header alone when it claims more than [`MAX_PIXELS`]: no memory is taken on the
 //! word of a few bytes.
 
-pub mod atomic;
 mod channel;
 mod color;
 mod environment;
@@ -20,7 +19,6 @@ mod srgb;
 mod tiff_file;
 mod write;
 
-pub use atomic::OutputError;
 pub use channel::Channel;
 pub use color::{ColorImage, ColorPixels, ColorSpace, load_color};
 pub use environment::{EnvironmentImage, load_environment};

@@ -10,8 +10,8 @@ use exr::prelude::{
     Text, WritableImage,
 };
 
-use super::atomic::{self, OutputError};
 use super::exr_picture::{ExrChannel, ExrPicture, ExrSamples};
+use crate::files::output::{self, OutputError};
 
 /// Writes an 8-bit RGB PNG, `pixels` sRGB-encoded, bottom row first, with `texts` (keyword, text) in it.
 pub fn write_png_rgb8(
@@ -59,7 +59,7 @@ fn write_png(
 ) -> Result<(), OutputError> {
     // A side beyond 32 bits holds more pixels than memory does; the encoder refuses what is beyond PNG's 31.
     let (width, height) = (width as u32, height as u32);
-    atomic::write(path, |file| {
+    output::write(path, |file| {
         let mut encoder = png::Encoder::new(file, width, height);
         encoder.set_compression(png::Compression::Fast);
         let written = describe(&mut encoder).and_then(|()| {
@@ -131,7 +131,7 @@ pub fn write_exr_picture(path: &Path, picture: ExrPicture) -> Result<(), OutputE
         attributes: ImageAttributes::new(display),
         layer_data: layer,
     };
-    atomic::write(path, |out| {
+    output::write(path, |out| {
         file.write()
             .to_buffered(&mut *out)
             .map_err(|error| match error {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::files::OutputError;
 use crate::image::test_files::Folder;
 use crate::image::{Channel, ColorPixels, ColorSpace, load_color, load_heights};
 use crate::surface::Wrap;

@@ -16,8 +16,9 @@ use super::info::{FrameInfo, attribute};
 use super::objects::{Objects, layer_key};
 use super::pixel::Pixel;
 use super::slot::{Layout, MEANS};
+use crate::files::OutputError;
 use crate::image::{
-    ExrChannel, ExrPicture, ExrSamples, OutputError, read_exr, read_exr_header, write_exr_picture,
+    ExrChannel, ExrPicture, ExrSamples, read_exr, read_exr_header, write_exr_picture,
 };
 use crate::scene::{Aov, AovSet};
 

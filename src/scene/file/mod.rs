@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{AssetError, Place, SceneError};
 use super::{Film, Integrator};
+use crate::files::input;
 pub(super) use camera::{CameraTable, ProjectionTable};
 pub(crate) use film::{MAX_SIDE, MAX_SPP, MAX_STOPS, fits, too_many_pixels};
 pub(super) use light::{LightTable, default_sun};
@@ -72,7 +73,7 @@ impl<T> Keyed<T> {
 impl SceneFile {
     /// Reads the file at `path`, with `overrides` (`key=value`) laid over it.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
+        let text = input::read_text(path).map_err(|source| SceneError::Read {
             path: path.to_owned(),
             source,
         })?;

@@ -18,6 +18,7 @@ use serde::Deserialize as _;
 
 use super::draco::{self, Announced, Compressed};
 use super::{LoadMeshErrorKind, LoadedFile, Parts, beside};
+use crate::files::input;
 use crate::surface::MeshBuilder;
 
 /// Required extensions that may be ignored: without them a texture or a light is lost, but no shape.
@@ -72,6 +73,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
     Ok(LoadedFile {
         parts,
         warnings: texcoords.warnings,
+        files: Vec::new(),
     })
 }
 
@@ -205,7 +207,7 @@ fn read_uri(uri: &str, path: &Path, what: &str) -> Result<Vec<u8>, LoadMeshError
             .ok_or_else(|| malformed(what, "its data URI is not valid base64"));
     }
     let file = beside(path, &percent_decoded(uri));
-    super::read_regular(&file).map_err(|source| LoadMeshErrorKind::Read {
+    input::read(&file).map_err(|source| LoadMeshErrorKind::Read {
         what: format!("{what}, {}", file.display()),
         source,
     })

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::files::input;
 use crate::ray::Aabb;
 use crate::surface::{MeshBuilder, Projection};
 pub use material::{
@@ -112,6 +113,8 @@ pub struct LoadedFile {
     pub parts: Vec<Part>,
     /// What was ignored and why, one line each, for the user.
     pub warnings: Vec<String>,
+    /// Every file that was read: the mesh file and what it names, pictures excepted.
+    pub files: Vec<PathBuf>,
 }
 
 /// The faces of one material.
@@ -171,7 +174,7 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     if !MESH_EXTENSIONS.contains(&extension.as_str()) {
         return Err(LoadMeshErrorKind::UnknownExtension { found: extension });
     }
-    let bytes = read_regular(path).map_err(|source| LoadMeshErrorKind::Read {
+    let bytes = input::read(path).map_err(|source| LoadMeshErrorKind::Read {
         what: "the file".into(),
         source,
     })?;
@@ -186,19 +189,12 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     if file.parts.is_empty() {
         return Err(LoadMeshErrorKind::NoFaces);
     }
+    file.files.push(path.to_owned());
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     for part in file.parts.iter_mut().filter(|p| p.name.is_empty()) {
         part.name = stem.clone().into_owned();
     }
     Ok(file)
-}
-
-/// The bytes of a regular file: a mesh file that names a device must not make us read for ever.
-fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(std::io::Error::other("not a regular file"));
-    }
-    std::fs::read(path)
 }
 
 /// Sorts meshes into parts by material and by whether they have texture coordinates.

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use glam::{Vec2, Vec3};
 
 use super::{FileMaterial, LoadMeshErrorKind, LoadedFile, Parts, mtl};
+use crate::files::input;
 use crate::surface::MeshBuilder;
 
 /// tobj's name for faces before any `o` or `g`.
@@ -70,7 +71,11 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
             share_vertices(&mut part.mesh);
         }
     }
-    Ok(LoadedFile { parts, warnings })
+    Ok(LoadedFile {
+        parts,
+        warnings,
+        files: Vec::new(),
+    })
 }
 
 fn builder(mesh: &tobj::Mesh) -> MeshBuilder {
@@ -173,7 +178,7 @@ impl<'a> Libraries<'a> {
 
     /// Its usable statements; none, and a warning, if it cannot be read.
     fn read_library(&mut self, file: &Path) -> String {
-        match super::read_regular(file) {
+        match input::read(file) {
             Ok(bytes) => mtl::clean(&String::from_utf8_lossy(&bytes), file, &mut self.warnings),
             Err(e) => {
                 let shown = file.display();
