@@ -1,12 +1,24 @@
 //! The words every room shares: a ray, eight of them, and an axis-aligned box.
 
 mod cone;
+mod leveled;
 mod packet;
 
 use glam::Vec3;
 
 pub use cone::{Cone, Footprint};
+pub(crate) use leveled::Leveled;
 pub use packet::{RayPacket, lanes_of};
+
+/// The largest coordinate of an origin, a direction, a scene or a point that is asked about, of either sign.
+///
+/// Embree takes no more (its `FLT_LARGE`, 1.844e18, whose square is an f32 still) and ends the program where it is built with
+/// assertions, as Debian's is. So nothing beyond reaches a backend, neither Embree nor the other: such a ray hits nothing, and such a
+/// scene is an error.
+pub const MAX_COORDINATE: f32 = 1.8e18;
+
+/// What is left of [`MAX_COORDINATE`] and Embree's own limit for boxes that are padded against rounding.
+const PADDED_COORDINATE: f32 = 1.84e18;
 
 /// A ray `origin + t * direction` for `t` in (`tnear`, `tfar`).
 ///
@@ -51,11 +63,18 @@ impl Ray {
         self.origin + t * self.direction
     }
 
-    /// False for a zero, NaN or infinite direction, a NaN or infinite origin, or a NaN interval: no
+    /// False for a zero direction, an origin or direction that is NaN or beyond [`MAX_COORDINATE`], or a NaN interval: no
     /// backend is asked about such a ray, it hits nothing.
     pub fn is_valid(&self) -> bool {
-        self.origin.is_finite()
-            && self.direction.is_finite()
+        self.is_valid_from(MAX_COORDINATE)
+    }
+
+    /// [`is_valid`](Self::is_valid) with another largest coordinate of the origin, of at most [`MAX_COORDINATE`].
+    #[inline(always)]
+    pub(crate) fn is_valid_from(&self, reach: f32) -> bool {
+        let within = |v: Vec3, reach: f32| v.abs().cmple(Vec3::splat(reach)).all();
+        within(self.origin, reach)
+            && within(self.direction, MAX_COORDINATE)
             && self.direction != Vec3::ZERO
             && self.tnear >= 0.0
             && self.tfar >= self.tnear
@@ -105,6 +124,17 @@ impl Aabb {
         self.min.cmple(self.max).all()
     }
 
+    /// The largest size of a coordinate; infinite for an empty box.
+    pub fn reach(&self) -> f32 {
+        self.min.abs().max(self.max.abs()).max_element()
+    }
+
+    /// Whether a backend takes the box: ordered, and within [`MAX_COORDINATE`] but for a little padding.
+    pub fn is_traceable(&self) -> bool {
+        // NaN is in no order.
+        self.is_valid() && self.reach() <= PADDED_COORDINATE
+    }
+
     /// Length of the diagonal; 0 for an empty box.
     pub fn diagonal(&self) -> f32 {
         if self.is_valid() {
@@ -117,8 +147,7 @@ impl Aabb {
     /// Grown outward by `ulps` units in the last place of its largest coordinate, so that f32
     /// rounding in a backend's box test never loses what lies on its faces.
     pub fn padded(self, ulps: f32) -> Self {
-        let reach = self.min.abs().max(self.max.abs()).max_element();
-        let pad = Vec3::splat(reach * ulps * f32::EPSILON);
+        let pad = Vec3::splat(self.reach() * ulps * f32::EPSILON);
         Self {
             min: self.min - pad,
             max: self.max + pad,

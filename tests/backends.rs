@@ -18,7 +18,7 @@ use prismarch::bvh::{BvhError, BvhTracer};
 use prismarch::prism::{March, PrismHit};
 use prismarch::ray::Ray;
 use prismarch::surface::BaseMesh;
-use prismarch::trace::{Hit, INVALID_ID, Object, Placement, Shape, Tracer, World};
+use prismarch::trace::{Hit, INVALID_ID, Object, Placement, Shape, Tracer, World, WorldError};
 
 /// Numbers in a fixed order, different for every seed.
 struct Random(u32);
@@ -342,10 +342,12 @@ fn a_transform_without_an_inverse_is_refused() {
     assert!(
         matches!(
             refused,
-            BvhError::BadTransform {
-                object: 0,
-                instance: 1,
-                ..
+            BvhError::World {
+                source: WorldError::Transform {
+                    object: 0,
+                    instance: 1,
+                    ..
+                }
             }
         ),
         "{refused}"

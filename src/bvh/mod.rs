@@ -21,12 +21,11 @@ use thiserror::Error;
 
 use crate::ray::{Aabb, Ray};
 use crate::surface::{DisplacementMap, TexelRect};
-use crate::trace::{Edited, Hit, INVALID_ID, Placement, Tracer, World, grown};
-use object::{Closest, ObjectTree, boxes, within_reach};
+use crate::trace::{
+    Asked, Edited, Hit, INVALID_ID, Placement, RayReach, Tracer, World, WorldError, grown, placed,
+};
+use object::{Closest, ObjectTree, boxes};
 use tree::Tree;
-
-/// Coordinates beyond this overflow the builder's sums of areas.
-const MAX_REACH: f32 = 1e15;
 
 /// An instance's box is grown by this many units in the last place of the terms that make it, for the
 /// rounding of the transforms of box and ray.
@@ -35,35 +34,12 @@ const INSTANCE_PAD_ULPS: f32 = 16.0;
 /// Why a world cannot be traced by this backend.
 #[derive(Debug, Error, PartialEq)]
 pub enum BvhError {
-    /// A primitive's box is inverted, not finite or too far out.
-    #[error(
-        "primitive {prim} of object {object} spans {} to {}; expected a box with coordinates within +-{max:e}",
-        bounds.min, bounds.max
-    )]
-    BadBounds {
-        /// Index of the object.
-        object: usize,
-        /// Primitive of the object.
-        prim: u32,
-        /// What was found.
-        bounds: Aabb,
-        /// Largest coordinate.
-        max: f32,
-    },
-    /// An instance's transform has no inverse, or moves the object too far out.
-    #[error(
-        "instance {instance} of object {object} has the transform {transform}; expected one with an inverse, \
-         that keeps coordinates within +-{max:e}"
-    )]
-    BadTransform {
-        /// Index of the object.
-        object: usize,
-        /// Index of the transform.
-        instance: usize,
-        /// What was found.
-        transform: Affine3A,
-        /// Largest coordinate.
-        max: f32,
+    /// No backend can trace it.
+    #[error("object {}: {source}", source.object())]
+    World {
+        /// Why.
+        #[from]
+        source: WorldError,
     },
     /// The tree came out too deep, as a great many primitives in one place can make it.
     #[error(
@@ -102,6 +78,7 @@ pub struct BvhTracer {
     top: Tree,
     /// [`World::growths`] when the boxes were taken.
     growths: Vec<u64>,
+    reach: RayReach,
 }
 
 impl BvhTracer {
@@ -111,6 +88,7 @@ impl BvhTracer {
     ///
     /// [`BvhError`] for boxes and transforms that cannot be traced.
     pub fn new(world: &World) -> Result<Self, BvhError> {
+        let reach = world.ray_reach()?;
         let growths = world.growths();
         let objects = world
             .objects()
@@ -125,6 +103,7 @@ impl BvhTracer {
             places,
             top: Tree::build(&boxes, 1)?,
             growths,
+            reach,
         })
     }
 
@@ -137,6 +116,7 @@ impl BvhTracer {
     /// nothing has changed.
     pub fn refit(&mut self, world: &World) -> Result<(), BvhError> {
         self.check_same_layout(world)?;
+        let reach = world.ray_reach()?;
         let growths = world.growths();
         let object_boxes = world
             .objects()
@@ -157,6 +137,7 @@ impl BvhTracer {
         self.places = places;
         self.top.refit(&place_boxes);
         self.growths = growths;
+        self.reach = reach;
         Ok(())
     }
 
@@ -228,12 +209,12 @@ impl BvhTracer {
         let Some(to_object) = &place.to_object else {
             return Some(*ray);
         };
-        let local = Ray {
+        // Valid, by what the world's reach promises.
+        Some(Ray {
             origin: to_object.transform_point3(ray.origin),
             direction: to_object.transform_vector3(ray.direction),
             ..*ray
-        };
-        local.is_valid().then_some(local)
+        })
     }
 
     fn to_hit(&self, closest: Closest) -> Hit {
@@ -256,31 +237,23 @@ impl BvhTracer {
 
 impl Tracer for BvhTracer {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        if !ray.is_valid() {
-            return None;
-        }
-        let mut best: Option<Closest> = None;
-        self.top.traverse(ray, |top| {
-            let place = &self.places[top as usize];
-            if let Some(local) = self.local_ray(place, ray) {
-                self.objects[place.object as usize].intersect(&local, top, &mut best);
+        match self.reach.asked(ray)? {
+            Asked::AsItIs => self.intersect_asked(ray),
+            Asked::Leveled(leveled) => {
+                let hit = self.intersect_asked(&leveled.ray)?;
+                let t = leveled.original_t(hit.t)?;
+                Some(Hit { t, ..hit })
             }
-            ControlFlow::Continue(best.map_or(ray.tfar, |best| best.tfar()))
-        });
-        best.map(|closest| self.to_hit(closest))
+        }
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        ray.is_valid()
-            && self.top.traverse(ray, |top| {
-                let place = &self.places[top as usize];
-                match self.local_ray(place, ray) {
-                    Some(local) if self.objects[place.object as usize].occluded(&local) => {
-                        ControlFlow::Break(())
-                    }
-                    _ => ControlFlow::Continue(ray.tfar),
-                }
-            })
+        match self.reach.asked(ray) {
+            None => false,
+            Some(Asked::AsItIs) => self.occluded_asked(ray),
+            // A hit counts by its own t.
+            Some(Asked::Leveled(_)) => self.intersect(ray).is_some(),
+        }
     }
 
     fn bounds(&self) -> Aabb {
@@ -297,6 +270,34 @@ impl Tracer for BvhTracer {
     }
 }
 
+impl BvhTracer {
+    #[inline(always)]
+    fn intersect_asked(&self, ray: &Ray) -> Option<Hit> {
+        let mut best: Option<Closest> = None;
+        self.top.traverse(ray, |top| {
+            let place = &self.places[top as usize];
+            if let Some(local) = self.local_ray(place, ray) {
+                self.objects[place.object as usize].intersect(&local, top, &mut best);
+            }
+            ControlFlow::Continue(best.map_or(ray.tfar, |best| best.tfar()))
+        });
+        best.map(|closest| self.to_hit(closest))
+    }
+
+    #[inline(always)]
+    fn occluded_asked(&self, ray: &Ray) -> bool {
+        self.top.traverse(ray, |top| {
+            let place = &self.places[top as usize];
+            match self.local_ray(place, ray) {
+                Some(local) if self.objects[place.object as usize].occluded(&local) => {
+                    ControlFlow::Break(())
+                }
+                _ => ControlFlow::Continue(ray.tfar),
+            }
+        })
+    }
+}
+
 /// Every place of the world in the order of top-level ids, and the box of what stands there;
 /// `bounds[object]` is in the object's own space.
 fn places(world: &World, bounds: &[Aabb]) -> Result<(Vec<Place>, Vec<Aabb>), BvhError> {
@@ -308,17 +309,16 @@ fn places(world: &World, bounds: &[Aabb]) -> Result<(Vec<Place>, Vec<Aabb>), Bvh
         let (to_object, placed) = match (&described.placement, instance) {
             (Placement::Instances(transforms), Some(instance)) => {
                 let transform = &transforms[instance as usize];
-                let inverse = transform.inverse();
                 let placed = transformed(bounds, transform);
-                if !inverse.is_finite() || !within_reach(placed) {
-                    return Err(BvhError::BadTransform {
+                if !placed.is_traceable() {
+                    return Err(WorldError::Placed {
                         object: object as usize,
                         instance: instance as usize,
-                        transform: *transform,
-                        max: MAX_REACH,
-                    });
+                        bounds: placed,
+                    }
+                    .into());
                 }
-                (Some(inverse), placed)
+                (Some(transform.inverse()), placed)
             }
             _ => (None, bounds),
         };
@@ -334,17 +334,7 @@ fn places(world: &World, bounds: &[Aabb]) -> Result<(Vec<Place>, Vec<Aabb>), Bvh
 
 /// The box over a transformed box, grown by [`INSTANCE_PAD_ULPS`].
 fn transformed(bounds: Aabb, transform: &Affine3A) -> Aabb {
-    let corner = |i: usize| {
-        let pick = |axis: usize| {
-            if i & (1 << axis) == 0 {
-                bounds.min[axis]
-            } else {
-                bounds.max[axis]
-            }
-        };
-        transform.transform_point3(Vec3::from_array([0, 1, 2].map(pick)))
-    };
-    let around = (0..8).map(corner).fold(Aabb::EMPTY, Aabb::including);
+    let around = placed(bounds, transform);
     // Terms may cancel, so the error is measured by their magnitudes and not by the box.
     let m = transform.matrix3;
     let magnitudes = Mat3A::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());

@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 
 use super::tree::Tree;
 use super::triangle::ShearedRay;
-use super::{BvhError, MAX_REACH};
+use super::BvhError;
 use crate::prism::{PrismHit, Prisms};
 use crate::ray::{Aabb, Ray};
 use crate::surface::BaseMesh;
-use crate::trace::Shape;
+use crate::trace::{Shape, WorldError};
 
 /// Rounding of a triangle test is within this many ulps of the box.
 const TRIANGLE_PAD_ULPS: f32 = 4.0;
@@ -185,7 +185,7 @@ fn len(shape: &Shape) -> usize {
     }
 }
 
-/// The boxes of a shape's primitives, all finite and within [`MAX_REACH`].
+/// The boxes of a shape's primitives, if all are [traceable](Aabb::is_traceable).
 pub(super) fn boxes(shape: &Shape, object: usize) -> Result<Vec<Aabb>, BvhError> {
     (0..len(shape) as u32)
         .map(|prim| {
@@ -197,23 +197,16 @@ pub(super) fn boxes(shape: &Shape, object: usize) -> Result<Vec<Aabb>, BvhError>
                     .fold(Aabb::EMPTY, Aabb::including)
                     .padded(TRIANGLE_PAD_ULPS),
             };
-            if within_reach(bounds) {
+            if bounds.is_traceable() {
                 Ok(bounds)
             } else {
-                Err(BvhError::BadBounds {
+                Err(WorldError::Bounds {
                     object,
                     prim,
                     bounds,
-                    max: MAX_REACH,
-                })
+                }
+                .into())
             }
         })
         .collect()
-}
-
-/// Whether a box is a box, and every coordinate at most [`MAX_REACH`].
-pub(super) fn within_reach(bounds: Aabb) -> bool {
-    bounds.is_valid()
-        && bounds.min.min_element() >= -MAX_REACH
-        && bounds.max.max_element() <= MAX_REACH
 }

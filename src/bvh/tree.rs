@@ -27,9 +27,18 @@ impl Tree {
     /// A tree over finite `boxes` (none is fine) with at most `leaf_size` (1 .. 3) of them per leaf.
     pub(super) fn build(boxes: &[Aabb], leaf_size: u32) -> Result<Self, BvhError> {
         let params = BvhBuildParams::medium_build();
+        // The builder squares and sums: far out that would overflow, and near 0 vanish.
+        let reach = boxes.iter().map(Aabb::reach).fold(0.0, f32::max);
+        let scale = if reach.is_normal() { reach.recip() } else { 1.0 };
         let leaves: Vec<ObvhsAabb> = (0u32..)
             .zip(boxes)
-            .map(|(index, &bounds)| scattered(bounds, index))
+            .map(|(index, &Aabb { min, max })| {
+                let scaled = Aabb {
+                    min: min * scale,
+                    max: max * scale,
+                };
+                scattered(scaled, index)
+            })
             .collect();
         let mut bvh2 = PlocBuilder::with_capacity(leaves.len()).build(
             params.ploc_search_distance,

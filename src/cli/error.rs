@@ -11,7 +11,7 @@ use crate::demo::WriteDemoError;
 use crate::files::OutputError;
 use crate::prism::MarchError;
 use crate::render::film::FrameError;
-use crate::scene::{AssetError, SceneError};
+use crate::scene::{AssetError, SceneError, UntraceableError};
 
 /// Exit code of wrong usage; clap's own.
 pub const USAGE: u8 = 2;
@@ -34,6 +34,9 @@ pub enum CliError {
     /// How a surface is to be marched.
     #[error(transparent)]
     March(#[from] MarchError),
+    /// A scene that no backend can trace.
+    #[error(transparent)]
+    Untraceable(#[from] UntraceableError),
     /// A picture to go on with or to merge.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -107,9 +110,12 @@ impl CliError {
         match self {
             Self::Usage(_) | Self::PictureFormat { .. } => USAGE,
             Self::Scene(error) if error.is_override() => USAGE,
-            Self::Scene(_) | Self::Asset(_) | Self::March(_) | Self::Frame(_) | Self::Rays(_) => {
-                INPUT
-            }
+            Self::Scene(_)
+            | Self::Asset(_)
+            | Self::March(_)
+            | Self::Untraceable(_)
+            | Self::Frame(_)
+            | Self::Rays(_) => INPUT,
             Self::Backend { .. } | Self::Threads { .. } | Self::Signals(_) => FAILED,
             // Signals are small numbers.
             Self::Interrupted { signal, .. } => (EXIT_BASE + signal) as u8,

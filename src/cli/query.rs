@@ -19,7 +19,7 @@ use crate::prism::PrismOptions;
 use crate::ray::Cone;
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
 use crate::surface::{DisplacedSurface, Displacement, Projection, Seams, UvTransform, Wrap};
-use crate::trace::World;
+use crate::trace::{RayReach, World};
 
 /// Trace rays from a CSV table and write their hits
 ///
@@ -161,6 +161,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     world.set_spread(spread);
     let engine = args.engine.build(&world)?;
     let query = Query {
+        // Checked when the world was made.
+        reach: world.ray_reach().unwrap_or_default(),
         world: &world,
         engine: &*engine,
         seed: args.jitter.unwrap_or(0),
@@ -235,6 +237,7 @@ const CHUNK: usize = 1 << 16;
 
 struct Query<'a> {
     world: &'a World,
+    reach: RayReach,
     engine: &'a dyn Engine,
     seed: u32,
     cone: Cone,
@@ -286,7 +289,7 @@ impl Query<'_> {
         let tracer = self.engine.tracer();
         let mut table = Vec::new();
         for (row, number) in rows.iter().zip(first..) {
-            let mut ray = layout.ray(row)?;
+            let mut ray = layout.ray(row, &self.reach)?;
             ray.key = key(self.seed, number);
             match tracer.intersect(&ray) {
                 Some(hit) => hits::append(&mut table, self.world, &hit, &ray, &self.cone),

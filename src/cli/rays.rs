@@ -8,7 +8,8 @@ use std::path::Path;
 use thiserror::Error;
 
 use crate::files::input;
-use crate::ray::Ray;
+use crate::ray::{MAX_COORDINATE, Ray};
+use crate::trace::RayReach;
 
 /// Columns that a table must have, then those it may have.
 const COLUMNS: [&str; 8] = ["ox", "oy", "oz", "dx", "dy", "dz", "tnear", "tfar"];
@@ -69,7 +70,7 @@ pub enum RayError {
         /// What the row has.
         found: String,
         /// What fits.
-        expected: &'static str,
+        expected: String,
     },
 }
 
@@ -217,14 +218,14 @@ impl Layout {
         })
     }
 
-    /// The ray of one row.
-    pub fn ray(&self, row: &Row) -> Result<Ray, RayError> {
+    /// The ray of one row, for a world of this reach.
+    pub fn ray(&self, row: &Row, reach: &RayReach) -> Result<Ray, RayError> {
         let fields = self.fields(row)?;
         let mut origin = [0.0; 3];
         let mut direction = [0.0; 3];
         for axis in 0..3 {
-            origin[axis] = self.finite(row, &fields, axis)?;
-            direction[axis] = self.finite(row, &fields, 3 + axis)?;
+            origin[axis] = self.within(row, &fields, axis, reach.origin())?;
+            direction[axis] = self.within(row, &fields, 3 + axis, MAX_COORDINATE)?;
         }
         let [dx, dy, dz] = direction;
         if direction == [0.0; 3] {
@@ -266,7 +267,7 @@ impl Layout {
         let [near, far] = [6, 7];
         let tnear = match fields[near] {
             b"" => 0.0,
-            _ => self.finite(row, fields, near)?,
+            _ => self.within(row, fields, near, f32::MAX)?,
         };
         if tnear < 0.0 {
             let found = tnear.to_string();
@@ -285,11 +286,24 @@ impl Layout {
         }
     }
 
-    fn finite(&self, row: &Row, fields: &[&[u8]; 8], column: usize) -> Result<f32, RayError> {
+    /// A number of at most this size.
+    fn within(
+        &self,
+        row: &Row,
+        fields: &[&[u8]; 8],
+        column: usize,
+        largest: f32,
+    ) -> Result<f32, RayError> {
         let text = fields[column];
-        number(text)
-            .filter(|x| x.is_finite())
-            .ok_or_else(|| self.value(row, COLUMNS[column], show(text), "a finite number"))
+        let found = number(text);
+        if let Some(x) = found.filter(|x| x.abs() <= largest) {
+            return Ok(x);
+        }
+        let expected = match found {
+            Some(x) if x.is_finite() => format!("a number within +-{largest:e}"),
+            _ => "a finite number".into(),
+        };
+        Err(self.value(row, COLUMNS[column], show(text), expected))
     }
 
     fn value(
@@ -297,14 +311,14 @@ impl Layout {
         row: &Row,
         column: &'static str,
         found: String,
-        expected: &'static str,
+        expected: impl Into<String>,
     ) -> RayError {
         RayError::Value {
             file: self.file.clone(),
             line: row.line,
             column,
             found,
-            expected,
+            expected: expected.into(),
         }
     }
 }
@@ -333,7 +347,7 @@ mod tests {
         loop {
             let count = reader.read(&mut rows)?;
             for row in &rows[..count] {
-                rays.push(reader.layout().ray(row)?);
+                rays.push(reader.layout().ray(row, &RayReach::default())?);
             }
             if count < rows.len() {
                 return Ok(rays);
@@ -396,6 +410,11 @@ mod tests {
             ("ox,oy,oz,dx,dy,dz\n0,0,0,nan,0,0\n", ":2: dx: found nan"),
             ("ox,oy,oz,dx,dy,dz\n0,0,0,1,-inf,0\n", ":2: dy: found -inf"),
             ("ox,oy,oz,dx,dy,dz\n0,0,0,1,1e99,0\n", ":2: dy: found 1e99"),
+            (
+                "ox,oy,oz,dx,dy,dz\n0,-1.9e18,0,1,0,0\n",
+                ":2: oy: found -1.9e18; expected a number within +-1.8e18",
+            ),
+            ("ox,oy,oz,dx,dy,dz\n0,0,0,1,0,1e30\n", ":2: dz: found 1e30; expected a number within +-1.8e18"),
             (
                 "ox,oy,oz,dx,dy,dz\r\n\r\n0,zero,0,1,0,0",
                 ":3: oy: found zero",

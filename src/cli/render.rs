@@ -143,6 +143,7 @@ impl Job<'_> {
         };
         let load = clock.lap();
         let world = loaded.scene.world()?;
+        loaded.scene.check_camera(&world)?;
         world.set_spread(self.march.spread(&loaded.scene));
         let engine = self.engine.build(&world)?;
         begun.info.backend = engine.tracer().name();

@@ -6,6 +6,8 @@ use glam::Vec3;
 use thiserror::Error;
 
 use super::sys;
+use crate::ray::MAX_COORDINATE;
+use crate::trace::{TransformError, WorldError};
 
 /// Embree's error codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,7 +98,7 @@ pub enum EmbreeError {
     NoTimeSteps,
     /// A box that is NaN, inverted or too large: Embree would drop the primitive silently.
     #[error(
-        "the bounds of primitive {prim} are {min} .. {max}; expected ordered numbers below 1.8e18"
+        "the bounds of primitive {prim} are {min} .. {max}; expected ordered numbers within +-{MAX_COORDINATE:e}"
     )]
     InvalidBounds {
         /// The primitive.
@@ -126,13 +128,15 @@ pub enum EmbreeError {
         /// How many vertices there are.
         vertices: usize,
     },
-    /// A transform without an inverse, or one that is not finite.
-    #[error(
-        "the transform of an instance has determinant {determinant}; expected an invertible, finite one"
-    )]
-    SingularTransform {
-        /// Of its 3x3 part.
-        determinant: f32,
+    /// A transform of an instance without an inverse, or one that is too extreme.
+    #[error(transparent)]
+    Transform(#[from] TransformError),
+    /// A world that no backend can trace.
+    #[error("object {}: {source}", source.object())]
+    World {
+        /// Why.
+        #[from]
+        source: WorldError,
     },
     /// A scene that itself has instances cannot be instanced.
     #[error("a scene with instances cannot be instanced: hits hold one instance level")]

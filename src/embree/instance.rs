@@ -16,7 +16,7 @@ pub struct Prototype(pub(super) u32);
 pub struct Instance {
     /// What is instanced.
     pub prototype: Prototype,
-    /// Object to world; invertible and finite.
+    /// Object to world; one that [`RayReach::through`](crate::trace::RayReach::through) takes.
     pub transform: Affine3A,
     /// A ray sees the instance when `ray.mask & mask != 0`, and then asks the masks inside it.
     pub mask: u32,
@@ -24,20 +24,12 @@ pub struct Instance {
 
 impl Instance {
     /// # Safety
-    /// `scene` outlives the geometry.
+    /// `scene` outlives the geometry, and its rays are within reach through the transform.
     pub(super) unsafe fn geometry(
         &self,
         device: &Device,
         scene: &Scene,
     ) -> Result<Geometry, EmbreeError> {
-        let determinant = self.transform.matrix3.determinant();
-        // NaN is neither.
-        if !(determinant != 0.0
-            && self.transform.is_finite()
-            && self.transform.inverse().is_finite())
-        {
-            return Err(EmbreeError::SingularTransform { determinant });
-        }
         let columns = self.transform.to_cols_array();
         let kind = Kind::Instance {
             prototype: self.prototype.0,

@@ -8,9 +8,9 @@ use glam::Vec3;
 use super::geometry::{Kind, count};
 use super::user::packet_to_raw;
 use super::{Device, EmbreeError, Geometry, HitTest, Instance, Prototype, sys};
-use crate::ray::{Aabb, Ray, RayPacket, time_within};
+use crate::ray::{Aabb, Ray, RayPacket, lanes_of, time_within};
 use crate::surface::PointQuery;
-use crate::trace::{Closest, Hit, MAX_INSTANCE_LEVELS};
+use crate::trace::{Asked, Closest, Hit, MAX_INSTANCE_LEVELS, RayReach};
 
 const _: () = assert!(MAX_INSTANCE_LEVELS == sys::PM_INSTANCE_LEVELS as usize);
 
@@ -78,6 +78,8 @@ pub struct SceneBuilder {
     prototypes: Vec<Scene>,
     /// Prototypes to be built again by the next commit; each is in range.
     edited: Vec<u32>,
+    /// Through all instances so far.
+    reach: RayReach,
     options: SceneOptions,
     device: Device,
 }
@@ -106,6 +108,7 @@ impl SceneBuilder {
             geometries: Vec::new(),
             prototypes: Vec::new(),
             edited: Vec::new(),
+            reach: RayReach::default(),
             options,
             device: device.clone(),
         })
@@ -149,9 +152,12 @@ impl SceneBuilder {
                 what: "prototype",
                 id,
             })?;
+        let reach = self.reach.through(&instance.transform)?;
         // SAFETY: prototypes are dropped after geometries, and edited in place only.
         let geometry = unsafe { instance.geometry(&self.device, scene) }?;
-        self.attach(geometry)
+        let id = self.attach(geometry)?;
+        self.reach = reach;
+        Ok(id)
     }
 
     /// Gives user geometry `id` another hit test. With as many primitives as before and
@@ -340,11 +346,25 @@ impl Scene {
         }
     }
 
-    /// The first hit with t in (tnear, tfar); none for a ray that is not [valid](Ray::is_valid).
+    /// The rays that Embree is asked about: others hit nothing.
+    pub fn ray_reach(&self) -> RayReach {
+        self.0.reach
+    }
+
+    /// The first hit with t in (tnear, tfar); none for a ray that is not within [`ray_reach`](Self::ray_reach).
     pub fn intersect1(&self, ray: &Ray) -> Option<Hit> {
-        if !ray.is_valid() {
-            return None;
+        match self.0.reach.asked(ray)? {
+            Asked::AsItIs => self.intersect_asked(ray),
+            Asked::Leveled(leveled) => {
+                let hit = self.intersect_asked(&leveled.ray)?;
+                let t = leveled.original_t(hit.t)?;
+                Some(Hit { t, ..hit })
+            }
         }
+    }
+
+    #[inline(always)]
+    fn intersect_asked(&self, ray: &Ray) -> Option<Hit> {
         let mut hit = BLANK_HIT;
         // SAFETY: a live, committed scene; the shim reads the ray and writes the hit.
         let found = unsafe { sys::pm_intersect1(self.raw(), &ray_to_raw(ray), &mut hit) };
@@ -353,12 +373,17 @@ impl Scene {
 
     /// Whether there is any hit with t in (tnear, tfar).
     pub fn occluded1(&self, ray: &Ray) -> bool {
-        // SAFETY: a live, committed scene; the shim reads the ray.
-        ray.is_valid() && unsafe { sys::pm_occluded1(self.raw(), &ray_to_raw(ray)) }
+        match self.0.reach.asked(ray) {
+            None => false,
+            // SAFETY: a live, committed scene; the shim reads the ray.
+            Some(Asked::AsItIs) => unsafe { sys::pm_occluded1(self.raw(), &ray_to_raw(ray)) },
+            // A hit counts by its own t.
+            Some(Asked::Leveled(_)) => self.intersect1(ray).is_some(),
+        }
     }
 
     /// The nearest point of the user geometries, by their [`HitTest::closest`], no further than `radius` (which may be infinite); none for a
-    /// point that is not finite or a radius that is NaN or negative. Distances are the world's, under any instance.
+    /// point that is not within [`MAX_COORDINATE`](crate::ray::MAX_COORDINATE) or a radius that is NaN or negative. Distances are the world's, under any instance.
     ///
     /// Embree's own triangles and grids are not looked at.
     pub fn closest(&self, point: Vec3, radius: f32) -> Option<Closest> {
@@ -410,13 +435,17 @@ impl Scene {
         rays: &RayPacket,
         coherence: Coherence,
     ) -> [Option<Hit>; RayPacket::LANES] {
+        let valid = self.0.reach.admitted(rays);
+        if valid & !rays.level() != 0 {
+            return std::array::from_fn(|lane| self.intersect1(&rays.ray(lane)));
+        }
         let mut hits = [BLANK_HIT; RayPacket::LANES];
         // SAFETY: a live, committed scene; the shim reads the packet and writes up to eight hits.
         let found = unsafe {
             sys::pm_intersect8(
                 self.raw(),
                 packet_to_raw(rays),
-                rays.valid().into(),
+                valid.into(),
                 coherence == Coherence::Coherent,
                 hits.as_mut_ptr(),
             )
@@ -426,12 +455,18 @@ impl Scene {
 
     /// [`occluded1`](Self::occluded1) for every lane: bit i tells of lane i, and is 0 for an empty one.
     pub fn occluded8(&self, rays: &RayPacket, coherence: Coherence) -> u8 {
+        let valid = self.0.reach.admitted(rays);
+        if valid & !rays.level() != 0 {
+            return lanes_of(valid)
+                .filter(|&lane| self.occluded1(&rays.ray(lane)))
+                .fold(0, |bits, lane| bits | 1 << lane);
+        }
         // SAFETY: a live, committed scene; the shim reads the packet.
         let bits = unsafe {
             sys::pm_occluded8(
                 self.raw(),
                 packet_to_raw(rays),
-                rays.valid().into(),
+                valid.into(),
                 coherence == Coherence::Coherent,
             )
         };

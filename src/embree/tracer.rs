@@ -48,7 +48,12 @@ enum Place {
 
 impl EmbreeTracer {
     /// Builds the world on a device of its own.
+    ///
+    /// # Errors
+    ///
+    /// [`EmbreeError::World`] where the world cannot be traced, and what Embree reports.
     pub fn new(world: &World, options: &EmbreeOptions) -> Result<Self, EmbreeError> {
+        world.ray_reach()?;
         let config = match options.threads {
             0 => String::new(),
             n => format!("threads={n}"),

@@ -151,9 +151,6 @@ pub(super) struct Stored<T> {
 /// robust mode does not reach user geometry.
 const PADDING_ULPS: f32 = 8.0;
 
-/// Embree drops boxes that reach further.
-const LARGEST_COORDINATE: f32 = 1.844e18;
-
 impl<T: HitTest + 'static> Stored<T> {
     pub(super) const CALLBACKS: sys::pm_hit_test = sys::pm_hit_test {
         bounds: Some(Self::on_bounds),
@@ -186,8 +183,8 @@ impl<T: HitTest + 'static> Stored<T> {
     fn checked_bounds(&self, prim: u32, step: u32) -> Aabb {
         let found = self.test.bounds_at(prim, step as usize);
         let bounds = found.padded(PADDING_ULPS);
-        let reach = bounds.min.abs().max(bounds.max.abs());
-        if bounds.is_valid() && reach.cmple(Vec3::splat(LARGEST_COORDINATE)).all() {
+        // Others Embree drops without a word.
+        if found.is_traceable() {
             return bounds;
         }
         self.faults.record(EmbreeError::InvalidBounds {

@@ -222,6 +222,13 @@ impl Prisms {
         self.edit_bounds
     }
 
+    /// The smallest and largest height of the map, or that there is room for.
+    pub(crate) fn heights(&self) -> (f32, f32) {
+        let (low, high) = self.surface.map().range();
+        let room = self.room.unwrap_or((low, high));
+        (low.min(room.0), high.max(room.1))
+    }
+
     /// Number of primitives that a backend traces. A hit names its base triangle.
     pub fn len(&self) -> usize {
         match &self.parts {

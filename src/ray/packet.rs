@@ -4,7 +4,7 @@ use std::array;
 
 use glam::Vec3;
 
-use super::{Ray, time_within};
+use super::{MAX_COORDINATE, Ray, time_within};
 
 /// Eight rays, one per lane, in arrays that a vector register loads whole.
 ///
@@ -98,13 +98,19 @@ impl RayPacket {
     /// Bit i tells whether the ray of lane i is [valid](Ray::is_valid).
     #[inline]
     pub fn valid(&self) -> u8 {
+        self.valid_from(MAX_COORDINATE)
+    }
+
+    /// [`valid`](Self::valid) with another largest coordinate of origins, of at most [`MAX_COORDINATE`].
+    #[inline]
+    pub(crate) fn valid_from(&self, reach: f32) -> u8 {
         // In lanes, as the compiler sees it: `Ray::is_valid` would be eight times its branches.
         let mut valid = [true; Self::LANES];
         let mut moves = [false; Self::LANES];
         for axis in 0..3 {
             for lane in 0..Self::LANES {
                 let (o, d) = (self.origin[axis][lane], self.direction[axis][lane]);
-                valid[lane] &= (o.abs() < f32::INFINITY) & (d.abs() < f32::INFINITY);
+                valid[lane] &= (o.abs() <= reach) & (d.abs() <= MAX_COORDINATE);
                 moves[lane] |= d != 0.0;
             }
         }
@@ -162,7 +168,18 @@ mod tests {
     fn lanes_are_valid_as_their_rays_are() {
         let sound = Ray::new(Vec3::ONE, Vec3::new(0.0, -0.0, 1e-40));
         let mut rays = vec![sound];
-        for x in [NAN, INF, -INF, f32::MAX, 0.0, -0.0, -1.0, 1.0] {
+        for x in [
+            NAN,
+            INF,
+            -INF,
+            f32::MAX,
+            MAX_COORDINATE,
+            -MAX_COORDINATE.next_up(),
+            0.0,
+            -0.0,
+            -1.0,
+            1.0,
+        ] {
             for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
                 // NaN only where the axis is: NaN * 0 is NaN.
                 let at = |v: Vec3| Vec3::select(axis.cmpgt(Vec3::ZERO), Vec3::splat(x), v);

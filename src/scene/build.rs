@@ -21,7 +21,7 @@ use crate::image::Channel;
 use crate::prism::{March, PrismOptions};
 use crate::surface::{
     BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Projection,
-    Seams, Wrap,
+    Seams, SurfaceError, Wrap,
 };
 use assets::Assets;
 
@@ -119,7 +119,7 @@ impl Loaded {
         let name = stem(mesh);
         let whole = file.into_single_mesh();
         let whole = builder.base_mesh(mesh, &name, whole, &Shaping::default())?;
-        let surface = displaced(&name, whole, &map, source.displacement)?;
+        let surface = displaced(&name, whole, (&source.map, &map), source.displacement)?;
         let material = builder.default_material();
         builder.objects.push(SceneObject {
             name,
@@ -304,7 +304,10 @@ impl Builder {
             .assets
             .heights(path, &channel, wrap.unwrap_or_default())
             .map_err(|e| at.asset(e))?;
-        displaced(name, mesh, &map, displacement).map_err(|e| file.asset(e))
+        displaced(name, mesh, (path, &map), displacement).map_err(|e| match e {
+            AssetError::Heights { .. } => at.asset(e),
+            _ => file.asset(e),
+        })
     }
 
     /// The index of the material that the scene names.
@@ -410,12 +413,19 @@ impl Builder {
 fn displaced(
     part: &str,
     mesh: Arc<BaseMesh>,
-    map: &Arc<DisplacementMap>,
+    (path, map): (&Path, &Arc<DisplacementMap>),
     displacement: Displacement,
 ) -> Result<DisplacedSurface, AssetError> {
-    DisplacedSurface::new(mesh, map.clone(), displacement).map_err(|source| AssetError::Surface {
-        part: part.to_owned(),
-        source,
+    DisplacedSurface::new(mesh, map.clone(), displacement).map_err(|source| {
+        let part = part.to_owned();
+        match source {
+            SurfaceError::TooHigh { .. } => AssetError::Heights {
+                path: path.to_owned(),
+                part,
+                source,
+            },
+            _ => AssetError::Surface { part, source },
+        }
     })
 }
 

@@ -157,6 +157,16 @@ pub enum AssetError {
         /// Why.
         source: crate::surface::MeshError,
     },
+    /// A map's heights displace the mesh by too much.
+    #[error("{}: {source} (on {part})", path.display())]
+    Heights {
+        /// The map.
+        path: PathBuf,
+        /// Which part of the mesh file.
+        part: String,
+        /// Why.
+        source: crate::surface::SurfaceError,
+    },
     /// Mesh and map do not make a displaced surface.
     #[error("{part}: {source}")]
     Surface {
@@ -164,5 +174,36 @@ pub enum AssetError {
         part: String,
         /// Why.
         source: crate::surface::SurfaceError,
+    },
+}
+
+/// Why a scene that is loaded cannot be traced.
+#[derive(Debug, Error)]
+pub enum UntraceableError {
+    /// How a surface is to be marched.
+    #[error(transparent)]
+    March(#[from] crate::prism::MarchError),
+    /// An object is too large, too far out, or under a transform that is too extreme.
+    #[error("{}: {object}: {source}", path.display())]
+    Object {
+        /// The scene file, or the mesh file.
+        path: PathBuf,
+        /// Its name.
+        object: String,
+        /// Why.
+        source: crate::trace::WorldError,
+    },
+    /// No ray can come from where the camera is.
+    #[error(
+        "{}: the camera is at {position}; with this scene's sizes and instances expected coordinates within +-{reach:e}",
+        path.display()
+    )]
+    Camera {
+        /// The scene file.
+        path: PathBuf,
+        /// Eye point.
+        position: glam::Vec3,
+        /// The largest coordinate, of either sign.
+        reach: f32,
     },
 }

@@ -24,7 +24,7 @@ use crate::surface::{BaseMesh, DisplacedSurface};
 
 pub use build::{Loaded, MapFile, MeshAndMap};
 pub use camera::{Camera, Lens, Projection};
-pub use error::{AssetError, Place, SceneError};
+pub use error::{AssetError, Place, SceneError, UntraceableError};
 pub(crate) use file::{MAX_SIDE, MAX_SPP, MAX_STOPS, STEP_TEXELS, fits, too_many_pixels};
 pub use film::{Adaptive, Aov, AovSet, Film, Filter, FilterShape, ToneCurve, Window};
 pub use integrator::{Integrator, PathLimits, View};

@@ -6,6 +6,7 @@ use glam::{Affine2, DVec2, Vec2, Vec3};
 use thiserror::Error;
 
 use super::{BaseMesh, Corners, DisplacementMap, Patch, Seams, UvTransform, Wall, seams};
+use crate::ray::MAX_COORDINATE;
 
 /// How a map's heights become displacement: D = scale * (h - midlevel).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,11 @@ impl Displacement {
             midlevel: 0.0,
             uv: UvTransform::default(),
         }
+    }
+
+    /// D of a height; infinite where no f32 holds it.
+    pub(crate) fn of(&self, height: f32) -> f32 {
+        (f64::from(self.scale) * (f64::from(height) - f64::from(self.midlevel))) as f32
     }
 }
 
@@ -49,6 +55,36 @@ pub enum SurfaceError {
         value: f32,
         /// What is expected.
         expected: &'static str,
+    },
+    /// A height that displaces by more than [`MAX_COORDINATE`].
+    #[error(
+        "texel ({x}, {y}) of the map (from the bottom left) is {height:e}, which the scale {scale:e} and the midlevel {midlevel:e} make a \
+         displacement of {displacement:e}; expected one within +-{MAX_COORDINATE:e}"
+    )]
+    TooHigh {
+        /// Column from the left.
+        x: usize,
+        /// Row from the bottom.
+        y: usize,
+        /// What is there.
+        height: f32,
+        /// Of the surface.
+        scale: f32,
+        /// Of the surface.
+        midlevel: f32,
+        /// What comes out, world units.
+        displacement: f32,
+    },
+    /// More texels under a triangle than can be told apart, let alone looked at.
+    #[error(
+        "the UV transform spreads triangle {triangle} over {texels:e} texels of the map; expected at most {max:e} from corner to corner",
+        max = DisplacedSurface::MAX_TEXELS
+    )]
+    TooFine {
+        /// The triangle, from 0.
+        triangle: usize,
+        /// Texels from corner to corner.
+        texels: f64,
     },
 }
 
@@ -133,14 +169,39 @@ impl DisplacedSurface {
         ] {
             finite("displacement uv transform", value)?;
         }
-        Ok(Self {
+        check_heights(&map, &displacement)?;
+        let surface = Self {
             mesh,
             map,
             displacement,
             seams: Seams::Open,
             walls: Arc::new([]),
             uv: uv.to_affine(),
-        })
+        };
+        surface.check_texels()?;
+        Ok(surface)
+    }
+
+    /// Texels from corner to corner of a triangle, at most.
+    pub const MAX_TEXELS: f64 = 1e9;
+
+    fn check_texels(&self) -> Result<(), SurfaceError> {
+        let (width, height) = self.map.size();
+        let size = DVec2::new(width as f64, height as f64);
+        for triangle in 0..self.mesh.triangles().len() {
+            let [a, b, c] = self
+                .corner_texcoords(triangle as u32)
+                .map(|st| st.as_dvec2() * size);
+            let across = (b - a).abs().max((c - a).abs()).max_element();
+            // NaN, as infinite coordinates make it, is no number of texels.
+            if !(across <= Self::MAX_TEXELS && a.is_finite()) {
+                return Err(SurfaceError::TooFine {
+                    triangle,
+                    texels: across,
+                });
+            }
+        }
+        Ok(())
     }
 
     /// The same surface with its seams open, as [`Self::new`] leaves them, or closed.
@@ -190,8 +251,8 @@ impl DisplacedSurface {
     /// Smallest and largest D anywhere on the map, world units.
     pub fn range(&self) -> (f32, f32) {
         let (low, high) = self.map.range();
-        let d = |h| self.displacement.scale * (h - self.displacement.midlevel);
-        (d(low).min(d(high)), d(low).max(d(high)))
+        let [low, high] = [low, high].map(|h| self.displacement.of(h));
+        (low.min(high), low.max(high))
     }
 
     /// Where in the map the corners of a triangle are: its texture coordinates after the UV transform.
@@ -224,4 +285,30 @@ impl DisplacedSurface {
             midlevel: f64::from(self.displacement.midlevel),
         }
     }
+}
+
+/// Fails at the first texel that displaces by too much.
+fn check_heights(map: &DisplacementMap, displacement: &Displacement) -> Result<(), SurfaceError> {
+    let is_too_high = |h: f32| displacement.of(h).abs() > MAX_COORDINATE;
+    let (low, high) = map.range();
+    if !is_too_high(low) && !is_too_high(high) {
+        return Ok(());
+    }
+    let (width, height) = map.size();
+    let mut row = vec![0.0; width];
+    for y in 0..height {
+        map.texels().copy(y * map.stride(), &mut row);
+        let heights = row.iter().map(|&stored| stored / map.unit());
+        if let Some((x, height)) = heights.enumerate().find(|&(_, h)| is_too_high(h)) {
+            return Err(SurfaceError::TooHigh {
+                x,
+                y,
+                height,
+                scale: displacement.scale,
+                midlevel: displacement.midlevel,
+                displacement: displacement.of(height),
+            });
+        }
+    }
+    Ok(())
 }

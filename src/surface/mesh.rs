@@ -4,7 +4,7 @@ use glam::{Affine3A, DVec3, Vec2, Vec3};
 use thiserror::Error;
 
 use super::normals;
-use crate::ray::Aabb;
+use crate::ray::{Aabb, MAX_COORDINATE};
 
 /// Why a mesh was refused. The loader that met it adds the file's name and the place.
 #[derive(Debug, Error, PartialEq)]
@@ -42,6 +42,16 @@ pub enum MeshError {
     NotFinite {
         /// `position`, `normal` or `texture coordinate`.
         what: &'static str,
+        /// Index of the vertex, from 0.
+        vertex: usize,
+        /// The first such coordinate.
+        value: f32,
+    },
+    /// A position beyond [`MAX_COORDINATE`].
+    #[error(
+        "the position of vertex {vertex} (from 0) holds {value:e}; expected coordinates within +-{MAX_COORDINATE:e}, also after the mesh's transform"
+    )]
+    TooFar {
         /// Index of the vertex, from 0.
         vertex: usize,
         /// The first such coordinate.
@@ -244,6 +254,12 @@ impl MeshBuilder {
             "texture coordinate",
             self.texcoords.iter().map(|st| st.to_array()),
         )?;
+        for (vertex, position) in self.positions.iter().enumerate() {
+            let beyond = |x: &f32| x.abs() > MAX_COORDINATE;
+            if let Some(value) = position.to_array().into_iter().find(beyond) {
+                return Err(MeshError::TooFar { vertex, value });
+            }
+        }
         for (triangle, corners) in self.triangles.iter().enumerate() {
             if let Some(&index) = corners.iter().find(|&&i| i as usize >= vertices) {
                 return Err(MeshError::IndexOutOfRange {

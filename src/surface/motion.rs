@@ -18,7 +18,7 @@ use super::{
     ClosestPoint, DisplacedSurface, InterpolateError, Interpolated, Patch, PointQuery, Seams,
     normals,
 };
-use crate::ray::time_within;
+use crate::ray::{MAX_COORDINATE, time_within};
 
 /// The base mesh's vertices at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,9 +52,9 @@ pub enum MotionError {
         /// Vertices of the mesh.
         vertices: usize,
     },
-    /// A NaN or infinite coordinate, or a normal of no length.
+    /// A NaN or infinite coordinate, a position beyond [`MAX_COORDINATE`], or a normal of no length.
     #[error(
-        "time step {step}: the {what} of vertex {vertex} is {value}; expected finite numbers, and normals not 0"
+        "time step {step}: the {what} of vertex {vertex} is {value}; expected finite numbers, positions within +-{MAX_COORDINATE:e}, and normals not 0"
     )]
     BadVector {
         /// Which step.
@@ -284,7 +284,7 @@ impl TimeStep {
             value,
         };
         let mut positions = self.positions.iter().enumerate();
-        if let Some(found) = positions.find(|(_, p)| !p.is_finite()) {
+        if let Some(found) = positions.find(|(_, p)| !(p.abs().max_element() <= MAX_COORDINATE && p.is_finite())) {
             return Err(bad("position", found));
         }
         let corners = |t: &[u32; 3]| t.map(|i| self.positions[i as usize]);

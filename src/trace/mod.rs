@@ -1,7 +1,9 @@
 //! The one interface both backends implement, and the world they are built from.
 
 mod edit;
+mod limits;
 mod offset;
+mod reach;
 mod world;
 
 use glam::Vec3;
@@ -9,7 +11,11 @@ use glam::Vec3;
 use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
 pub use edit::Edited;
 pub(crate) use edit::grown;
+pub use limits::WorldError;
+pub(crate) use limits::placed;
 pub use offset::RayOffset;
+pub(crate) use reach::Asked;
+pub use reach::{MAX_STRETCH, RayReach, TransformError};
 pub use world::{Object, PlacedObject, Placement, Resolved, Shape, World};
 
 /// Instance levels a hit can hold: one, as Debian's Embree is built.
@@ -69,7 +75,7 @@ impl Hit {
 
 /// Something that traces rays through a [`World`].
 ///
-/// Rays that are not [valid](Ray::is_valid) hit nothing.
+/// Rays that are not [valid](Ray::is_valid), or beyond the [reach](World::ray_reach) of the world, hit nothing.
 pub trait Tracer: Sync {
     /// The first hit with t in (tnear, tfar).
     fn intersect(&self, ray: &Ray) -> Option<Hit>;

@@ -2,7 +2,7 @@ use glam::{Affine3A, Mat3, Quat};
 
 use super::*;
 use crate::embree::{EmbreeError, Instance, Prototype};
-use crate::trace::Hit;
+use crate::trace::{Hit, TransformError};
 
 fn instanced(transform: Affine3A, mask: u32) -> Result<Scene, EmbreeError> {
     let device = device();
@@ -96,7 +96,10 @@ fn transforms_without_an_inverse_are_refused() {
     for transform in [flat, nan] {
         let error = instanced(transform, 1).err().unwrap();
         assert!(
-            matches!(error, EmbreeError::SingularTransform { .. }),
+            matches!(
+                error,
+                EmbreeError::Transform(TransformError::Singular { .. })
+            ),
             "{error}"
         );
     }

@@ -57,10 +57,12 @@ pub(super) fn camera(table: &CameraTable, bounds: Aabb) -> Result<Camera, SceneE
         .map_or_else(|| framing_eye(target, bounds, table.fov), |p| p.value);
     let up = table.up.as_ref().map_or(Vec3::Y, |u| u.value);
     let view = target - position;
+    // Of the scene's size first: the square of a far view is no f32.
+    let towards = (view / view.abs().max_element()).try_normalize();
     let stated = [&table.target, &table.position, &table.up];
     let culprit = stated.into_iter().flatten().next();
-    match (view.try_normalize(), culprit) {
-        (None, Some(at)) => {
+    match (towards, culprit) {
+        (None, Some(at)) if view.is_finite() => {
             let found = format!("the eye and the target both at {position}");
             Err(at.refuse(found, "two different points"))
         }

@@ -60,8 +60,6 @@ impl Default for CameraTable {
     }
 }
 
-const LENGTH: &str = "world units above 0";
-
 impl CameraTable {
     pub(super) fn read(item: Item) -> Result<Self, SceneError> {
         let mut section = item.section(&[
@@ -78,9 +76,8 @@ impl CameraTable {
             "blade_rotation",
             "allow_inside",
         ])?;
-        let point = "a point, [x, y, z]";
-        let position = section.optional("position", |i| Ok(keyed(&i, i.vec3(point, |_| true)?)))?;
-        let target = section.optional("target", |i| Ok(keyed(&i, i.vec3(point, |_| true)?)))?;
+        let position = section.optional("position", |i| Ok(keyed(&i, i.point()?)))?;
+        let target = section.optional("target", |i| Ok(keyed(&i, i.point()?)))?;
         let up = section.optional("up", |i| {
             let up = i.vec3("a direction, [x, y, z], not zero", |v| {
                 v.try_normalize().is_some()
@@ -124,7 +121,7 @@ fn projection(section: &mut Section) -> Result<ProjectionTable, SceneError> {
     let Some(item) = section.get("height") else {
         return Ok(found);
     };
-    let height = item.number(LENGTH, |x| x > 0.0)?;
+    let height = item.length(false)?;
     match found {
         ProjectionTable::Orthographic { .. } => Ok(ProjectionTable::Orthographic {
             height: Some(height),
@@ -137,12 +134,8 @@ fn projection(section: &mut Section) -> Result<ProjectionTable, SceneError> {
 }
 
 fn lens(section: &mut Section) -> Result<Option<LensTable>, SceneError> {
-    let aperture = section.optional("aperture", |i| {
-        i.number("the diameter of the lens, world units of at least 0", |x| {
-            x >= 0.0
-        })
-    })?;
-    let focus_distance = section.optional("focus_distance", |i| i.number(LENGTH, |x| x > 0.0))?;
+    let aperture = section.optional("aperture", |i| i.length(true))?;
+    let focus_distance = section.optional("focus_distance", |i| i.length(false))?;
     let blades = section.optional("blades", |i| {
         let blades = i.integer(0..=64)?;
         let some = blades == 0 || blades >= 3;

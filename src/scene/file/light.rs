@@ -159,7 +159,7 @@ fn rectangle(item: Item) -> Result<LightTable, SceneError> {
     let edges = section.require("edges", expected)?;
     let refusal = edges.refuse(expected);
     let items = edges.items(expected)?;
-    let read = items.iter().map(|i| i.vec3("an edge, [x, y, z]", |_| true));
+    let read = items.iter().map(Item::point);
     let edges: Vec<Vec3> = read.collect::<Result<_, _>>()?;
     match edges[..] {
         [a, b] if a.cross(b).try_normalize().is_some() => Ok(LightTable::Ready(Light::Rectangle {
@@ -195,23 +195,21 @@ fn spot(item: Item) -> Result<LightTable, SceneError> {
 }
 
 fn point(section: &mut Section, key: &str) -> Result<Vec3, SceneError> {
-    let expected = "a point, [x, y, z]";
-    section.require(key, expected)?.vec3(expected, |_| true)
+    section.require(key, "a point, [x, y, z]")?.point()
 }
 
 /// The unit vector from `position` to the required `target`.
 fn towards(section: &mut Section, position: Vec3) -> Result<Vec3, SceneError> {
     let expected = "a point other than the position, [x, y, z]";
     let target = section.require("target", expected)?;
-    let target = target.vec3(expected, |t| (t - position).try_normalize().is_some())?;
-    Ok((target - position).normalize())
+    let towards = target.point()? - position;
+    towards
+        .try_normalize()
+        .ok_or_else(|| target.refuse(expected))
 }
 
 fn radius(section: &mut Section) -> Result<f32, SceneError> {
-    let expected = "world units above 0";
-    section
-        .require("radius", expected)?
-        .number(expected, |x| x > 0.0)
+    section.require("radius", "world units above 0")?.length(false)
 }
 
 /// `color` times `strength`.

@@ -228,7 +228,7 @@ fn instances(item: Item) -> Result<Vec<Affine3A>, SceneError> {
 /// Scaled, then turned about x, y and z in this order, then moved.
 fn transform(item: Item) -> Result<Affine3A, SceneError> {
     let mut section = item.section(&["translate", "rotate", "scale"])?;
-    let translate = section.optional("translate", |i| i.vec3("[x, y, z]", |_| true))?;
+    let translate = section.optional("translate", |i| i.point())?;
     let rotate = section.optional("rotate", |i| {
         i.vec3("degrees about x, y and z, [x, y, z]", |_| true)
     })?;

@@ -10,6 +10,7 @@ use glam::{Vec2, Vec3};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::ray::MAX_COORDINATE;
 use super::overrides::Override;
 use super::{Place, SceneError};
 
@@ -204,6 +205,21 @@ impl<'a> Item<'a> {
             .map(Vec3::from_array)
             .filter(|&v| fits(v))
             .ok_or_else(|| self.refuse(expected))
+    }
+
+    /// A point, `[x, y, z]`, that rays can come from.
+    pub fn point(&self) -> Result<Vec3, SceneError> {
+        let expected = format!("a point, [x, y, z], within +-{MAX_COORDINATE:e}");
+        self.vec3(&expected, |p| p.abs().max_element() <= MAX_COORDINATE)
+    }
+
+    /// A length above 0, or of at least 0.
+    pub fn length(&self, may_be_zero: bool) -> Result<f32, SceneError> {
+        let least = if may_be_zero { "of at least 0" } else { "above 0" };
+        let expected = format!("world units {least}, up to {MAX_COORDINATE:e}");
+        self.number(&expected, |x| {
+            (x > 0.0 || may_be_zero && x == 0.0) && x <= MAX_COORDINATE
+        })
     }
 
     /// `[x, y]`, each number finite.
