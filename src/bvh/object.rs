@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
+use super::BvhError;
 use super::tree::Tree;
 use super::triangle::ShearedRay;
-use super::BvhError;
 use crate::prism::{PrismHit, Prisms};
 use crate::ray::{Aabb, Ray};
 use crate::surface::BaseMesh;

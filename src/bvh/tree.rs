@@ -29,7 +29,11 @@ impl Tree {
         let params = BvhBuildParams::medium_build();
         // The builder squares and sums: far out that would overflow, and near 0 vanish.
         let reach = boxes.iter().map(Aabb::reach).fold(0.0, f32::max);
-        let scale = if reach.is_normal() { reach.recip() } else { 1.0 };
+        let scale = if reach.is_normal() {
+            reach.recip()
+        } else {
+            1.0
+        };
         let leaves: Vec<ObvhsAabb> = (0u32..)
             .zip(boxes)
             .map(|(index, &Aabb { min, max })| {

@@ -414,7 +414,10 @@ mod tests {
                 "ox,oy,oz,dx,dy,dz\n0,-1.9e18,0,1,0,0\n",
                 ":2: oy: found -1.9e18; expected a number within +-1.8e18",
             ),
-            ("ox,oy,oz,dx,dy,dz\n0,0,0,1,0,1e30\n", ":2: dz: found 1e30; expected a number within +-1.8e18"),
+            (
+                "ox,oy,oz,dx,dy,dz\n0,0,0,1,0,1e30\n",
+                ":2: dz: found 1e30; expected a number within +-1.8e18",
+            ),
             (
                 "ox,oy,oz,dx,dy,dz\r\n\r\n0,zero,0,1,0,0",
                 ":3: oy: found zero",

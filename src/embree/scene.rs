@@ -383,7 +383,7 @@ impl Scene {
     }
 
     /// The nearest point of the user geometries, by their [`HitTest::closest`], no further than `radius` (which may be infinite); none for a
-    /// point that is not within [`MAX_COORDINATE`](crate::ray::MAX_COORDINATE) or a radius that is NaN or negative. Distances are the world's, under any instance.
+    /// point that is not finite or a radius that is NaN or negative. Distances are the world's, under any instance.
     ///
     /// Embree's own triangles and grids are not looked at.
     pub fn closest(&self, point: Vec3, radius: f32) -> Option<Closest> {

@@ -25,7 +25,6 @@ use std::collections::BinaryHeap;
 use glam::{Affine3A, DVec2, Vec3};
 
 use super::{DisplacedSurface, Patch};
-use crate::ray::MAX_COORDINATE;
 use bounds::{Part, Placed};
 
 /// The nearest point of a displaced surface.
@@ -67,10 +66,9 @@ impl PointQuery {
         }
     }
 
-    /// False for a point that is NaN or beyond [`MAX_COORDINATE`], a NaN or infinite transform, and a radius that is NaN or negative:
-    /// nothing is near such a point.
+    /// False for a NaN or infinite point or transform and a radius that is NaN or negative: nothing is near such a point.
     pub fn is_valid(&self) -> bool {
-        self.point.abs().cmple(Vec3::splat(MAX_COORDINATE)).all() && self.radius >= 0.0 && self.to_world.is_finite()
+        self.point.is_finite() && self.radius >= 0.0 && self.to_world.is_finite()
     }
 }
 

@@ -58,8 +58,8 @@ pub enum SurfaceError {
     },
     /// A height that displaces by more than [`MAX_COORDINATE`].
     #[error(
-        "texel ({x}, {y}) of the map (from the bottom left) is {height:e}, which the scale {scale:e} and the midlevel {midlevel:e} make a \
-         displacement of {displacement:e}; expected one within +-{MAX_COORDINATE:e}"
+        "texel ({x}, {y}) of the map (from the bottom left) is {height:?}, which the scale {scale:?} and the midlevel {midlevel:?} make a \
+         displacement of {displacement:?}; expected one within +-{MAX_COORDINATE:e}"
     )]
     TooHigh {
         /// Column from the left.
@@ -75,9 +75,10 @@ pub enum SurfaceError {
         /// What comes out, world units.
         displacement: f32,
     },
-    /// More texels under a triangle than can be told apart, let alone looked at.
+    /// More texels under a triangle than [`DisplacedSurface::MAX_TEXELS`].
     #[error(
-        "the UV transform spreads triangle {triangle} over {texels:e} texels of the map; expected at most {max:e} from corner to corner",
+        "triangle {triangle} (from 0) is spread over {texels:e} texels of the map by its texture coordinates and their transform; \
+         expected at most {max} from corner to corner",
         max = DisplacedSurface::MAX_TEXELS
     )]
     TooFine {
@@ -182,8 +183,8 @@ impl DisplacedSurface {
         Ok(surface)
     }
 
-    /// Texels from corner to corner of a triangle, at most.
-    pub const MAX_TEXELS: f64 = 1e9;
+    /// Texels across or up from corner to corner of a triangle, at most: the exact march does not go along more of them.
+    pub const MAX_TEXELS: f64 = (1u32 << 25) as f64;
 
     fn check_texels(&self) -> Result<(), SurfaceError> {
         let (width, height) = self.map.size();

@@ -49,7 +49,7 @@ pub enum MeshError {
     },
     /// A position beyond [`MAX_COORDINATE`].
     #[error(
-        "the position of vertex {vertex} (from 0) holds {value:e}; expected coordinates within +-{MAX_COORDINATE:e}, also after the mesh's transform"
+        "the position of vertex {vertex} (from 0) holds {value:?}; expected coordinates within +-{MAX_COORDINATE:e}, also after the mesh's transform"
     )]
     TooFar {
         /// Index of the vertex, from 0.

@@ -284,7 +284,9 @@ impl TimeStep {
             value,
         };
         let mut positions = self.positions.iter().enumerate();
-        if let Some(found) = positions.find(|(_, p)| !(p.abs().max_element() <= MAX_COORDINATE && p.is_finite())) {
+        if let Some(found) =
+            positions.find(|(_, p)| !(p.abs().max_element() <= MAX_COORDINATE && p.is_finite()))
+        {
             return Err(bad("position", found));
         }
         let corners = |t: &[u32; 3]| t.map(|i| self.positions[i as usize]);

@@ -89,22 +89,34 @@ impl World {
         // The instance that leaves the least.
         let mut tightest = (0, 0);
         for (object, described) in self.objects().iter().enumerate() {
-            let own = own_bounds(&described.shape)
-                .map_err(|(prim, bounds)| WorldError::Bounds { object, prim, bounds })?;
+            let own =
+                own_bounds(&described.shape).map_err(|(prim, bounds)| WorldError::Bounds {
+                    object,
+                    prim,
+                    bounds,
+                })?;
             let Placement::Instances(transforms) = &described.placement else {
                 size = size.max(own.reach());
                 continue;
             };
             for (instance, transform) in transforms.iter().enumerate() {
-                let reach = all.through(transform).map_err(|source| {
-                    WorldError::Transform { object, instance, source }
-                })?;
+                let reach = all
+                    .through(transform)
+                    .map_err(|source| WorldError::Transform {
+                        object,
+                        instance,
+                        source,
+                    })?;
                 if reach != all {
                     (all, tightest) = (reach, (object, instance));
                 }
                 let bounds = placed(own, transform);
                 if !bounds.is_traceable() {
-                    return Err(WorldError::Placed { object, instance, bounds });
+                    return Err(WorldError::Placed {
+                        object,
+                        instance,
+                        bounds,
+                    });
                 }
                 size = size.max(bounds.reach());
             }

@@ -30,17 +30,15 @@ pub enum TransformError {
         determinant: f32,
     },
     /// Beyond [`MAX_STRETCH`].
-    #[error(
-        "the transform multiplies lengths by {found:e}; expected 1e-12 to {MAX_STRETCH:e}"
-    )]
+    #[error("the transform multiplies lengths by {found:e}; expected 1e-12 to {MAX_STRETCH:e}")]
     Stretch {
         /// The factor.
         found: f32,
     },
     /// The translation is so far, or the inverse so large, that no ray of the world is within [`MAX_COORDINATE`] of the object's space.
     #[error(
-        "the transform moves by {translation:e} what it multiplies by as little as {smallest:e}: in the object's own space the world is \
-         beyond +-{MAX_COORDINATE:e}"
+        "the transform multiplies lengths by as little as {smallest:e} and moves by {translation:e}; expected a translation within \
+         +-{MAX_COORDINATE:e} in the object's own space"
     )]
     TooFar {
         /// The largest component of the translation.

@@ -209,7 +209,9 @@ fn towards(section: &mut Section, position: Vec3) -> Result<Vec3, SceneError> {
 }
 
 fn radius(section: &mut Section) -> Result<f32, SceneError> {
-    section.require("radius", "world units above 0")?.length(false)
+    section
+        .require("radius", "world units above 0")?
+        .length(false)
 }
 
 /// `color` times `strength`.

@@ -10,9 +10,9 @@ use glam::{Vec2, Vec3};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::ray::MAX_COORDINATE;
 use super::overrides::Override;
 use super::{Place, SceneError};
+use crate::ray::MAX_COORDINATE;
 
 /// What is found where a required key is missing.
 const MISSING: &str = "nothing (the key is missing)";
@@ -215,7 +215,11 @@ impl<'a> Item<'a> {
 
     /// A length above 0, or of at least 0.
     pub fn length(&self, may_be_zero: bool) -> Result<f32, SceneError> {
-        let least = if may_be_zero { "of at least 0" } else { "above 0" };
+        let least = if may_be_zero {
+            "of at least 0"
+        } else {
+            "above 0"
+        };
         let expected = format!("world units {least}, up to {MAX_COORDINATE:e}");
         self.number(&expected, |x| {
             (x > 0.0 || may_be_zero && x == 0.0) && x <= MAX_COORDINATE
