@@ -1,9 +1,10 @@
 //! Meshes, maps and rays from bytes. What the bytes do not say is zero.
 
-use glam::{Vec2, Vec3};
+use glam::{Affine3A, EulerRot, Quat, Vec2, Vec3};
 use prismarch::prism::{EditBounds, Lod, March, PrismOptions, Step};
 use prismarch::ray::{Ray, RayPacket};
 use prismarch::surface::{Displacement, MeshBuilder, TexelRect, Texels, UvTransform, Wrap};
+use prismarch::trace::Placement;
 
 pub struct Input<'b>(pub &'b [u8]);
 
@@ -28,7 +29,7 @@ impl Input<'_> {
 
     /// Mostly a number near 1, now and then one of the odd ones, or any bits.
     pub fn number(&mut self) -> f32 {
-        const ODD: [f32; 16] = [
+        const ODD: [f32; 20] = [
             0.0,
             -0.0,
             1.0,
@@ -40,14 +41,18 @@ impl Input<'_> {
             f32::EPSILON,
             16_777_216.0,
             1e15,
+            -1e-19,
+            1.8e18,
+            -1.844e18,
             -1e19,
+            1e30,
             f32::MAX,
             f32::INFINITY,
             f32::NEG_INFINITY,
             f32::NAN,
         ];
         match self.byte() {
-            tag @ 0..=31 => ODD[usize::from(tag % 16)],
+            tag @ 0..=31 => ODD[usize::from(tag) % ODD.len()],
             32..=47 => f32::from_bits(self.bits()),
             48..=79 => f32::from(self.byte() as i8) * 0.0625,
             80..=95 => f32::from(self.word() as i16) * 1e3,
@@ -150,6 +155,21 @@ impl Input<'_> {
     /// How fast cones grow: from a thousandth of a degree to half a sphere.
     pub fn spread(&mut self) -> f32 {
         3.0 * 10f32.powi(-i32::from(self.byte() % 6))
+    }
+
+    /// In the world as it is, or through instances.
+    pub fn placement(&mut self) -> Placement {
+        match self.byte() % 8 {
+            0 => Placement::Instances(vec![Affine3A::IDENTITY, self.transform()]),
+            1 => Placement::Instances(vec![self.transform()]),
+            _ => Placement::World,
+        }
+    }
+
+    fn transform(&mut self) -> Affine3A {
+        let (scale, turn, translation) = (self.vec3(), self.vec3(), self.vec3());
+        let turn = Quat::from_euler(EulerRot::XYZ, turn.x, turn.y, turn.z);
+        Affine3A::from_scale_rotation_translation(scale, turn, translation)
     }
 
     pub fn ray(&mut self) -> Ray {

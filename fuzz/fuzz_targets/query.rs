@@ -12,7 +12,7 @@ use prismarch::bvh::BvhTracer;
 use prismarch::prism::{PrismHit, Prisms, SimdLevel};
 use prismarch::ray::{Ray, RayPacket};
 use prismarch::surface::{DisplacedSurface, DisplacementMap, NormalMode};
-use prismarch::trace::{Object, Placement, Shape, Tracer, World};
+use prismarch::trace::{Object, Shape, Tracer, World};
 
 fuzz_target!(|bytes: &[u8]| {
     let mut input = Input(bytes);
@@ -54,9 +54,11 @@ fn run(input: &mut Input) -> Option<()> {
         prisms.set_spread(spread);
         both.extend(prisms.with_simd(level).map(Arc::new));
     }
+    let placement = input.placement();
+    show(&placement);
     let world = World::new(vec![Object {
         shape: Shape::Displaced(both[0].clone()),
-        placement: Placement::World,
+        placement,
         mask: u32::MAX,
     }]);
     let mut tracer = BvhTracer::new(&world).ok();

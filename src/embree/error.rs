@@ -98,7 +98,8 @@ pub enum EmbreeError {
     NoTimeSteps,
     /// A box that is NaN, inverted or too large: Embree would drop the primitive silently.
     #[error(
-        "the bounds of primitive {prim} are {min} .. {max}; expected ordered numbers within +-{MAX_COORDINATE:e}"
+        "the bounds of primitive {prim} are {:?} .. {:?}; expected ordered numbers within +-{MAX_COORDINATE:e}",
+        min.to_array(), max.to_array()
     )]
     InvalidBounds {
         /// The primitive.

@@ -160,6 +160,11 @@ impl SceneBuilder {
         Ok(id)
     }
 
+    /// Asks about rays within `reach` only, which must be no more than what the instances leave.
+    pub(super) fn narrow(&mut self, reach: RayReach) {
+        self.reach = reach;
+    }
+
     /// Gives user geometry `id` another hit test. With as many primitives as before and
     /// [`BuildQuality::Low`] the next commit refits.
     pub fn replace<T: HitTest + 'static>(

@@ -53,7 +53,7 @@ impl EmbreeTracer {
     ///
     /// [`EmbreeError::World`] where the world cannot be traced, and what Embree reports.
     pub fn new(world: &World, options: &EmbreeOptions) -> Result<Self, EmbreeError> {
-        world.ray_reach()?;
+        let reach = world.ray_reach()?;
         let config = match options.threads {
             0 => String::new(),
             n => format!("threads={n}"),
@@ -84,6 +84,7 @@ impl EmbreeTracer {
                 }
             });
         }
+        builder.narrow(reach);
         Ok(Self {
             scene: builder.commit()?,
             places,

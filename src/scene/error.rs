@@ -195,8 +195,8 @@ pub enum UntraceableError {
     },
     /// No ray can come from where the camera is.
     #[error(
-        "{}: the camera is at {position}; with this scene's sizes and instances expected coordinates within +-{reach:e}",
-        path.display()
+        "{}: the camera is at {:?}; with this scene's sizes and instances expected coordinates within +-{reach:e}",
+        path.display(), position.to_array()
     )]
     Camera {
         /// The scene file.

@@ -4,7 +4,7 @@ use glam::{Affine3A, Vec3};
 use thiserror::Error;
 
 use super::reach::SURROUNDINGS;
-use super::{Placement, RayReach, Shape, TransformError, World};
+use super::{Object, Placement, RayReach, Shape, TransformError, World};
 use crate::prism::Prisms;
 use crate::ray::{Aabb, MAX_COORDINATE};
 use crate::surface::Patch;
@@ -14,8 +14,8 @@ use crate::surface::Patch;
 pub enum WorldError {
     /// A primitive's box is inverted, not finite or too far out.
     #[error(
-        "primitive {prim} spans {} to {}; expected coordinates within +-{MAX_COORDINATE:e}",
-        bounds.min, bounds.max
+        "primitive {prim} spans {:?} to {:?}; expected coordinates within +-{MAX_COORDINATE:e}",
+        bounds.min.to_array(), bounds.max.to_array()
     )]
     Bounds {
         /// Index of the object.
@@ -37,8 +37,8 @@ pub enum WorldError {
     },
     /// An instance stands too far out, or its transform makes the object too large.
     #[error(
-        "instance {instance} spans {} to {}; expected coordinates within +-{MAX_COORDINATE:e}",
-        bounds.min, bounds.max
+        "instance {instance} spans {:?} to {:?}; expected coordinates within +-{MAX_COORDINATE:e}",
+        bounds.min.to_array(), bounds.max.to_array()
     )]
     Placed {
         /// Index of the object.
@@ -48,21 +48,29 @@ pub enum WorldError {
         /// What was found.
         bounds: Aabb,
     },
-    /// Rays from the world's own surroundings would be beyond [`MAX_COORDINATE`] in the space of an instance.
+    /// Rays from the world's own surroundings would be beyond what one of its parts takes.
     #[error(
-        "instance {instance} is so small that in its own space only what is within +-{reach:e} is within +-{MAX_COORDINATE:e}, and \
-         the scene reaches to {world:e}; expected at most a sixteenth"
+        "{} takes rays from within +-{reach:e} only, and the scene reaches to {world:e}; expected a sixteenth of that at most",
+        part(*instance)
     )]
     Surroundings {
         /// Index of the object.
         object: usize,
-        /// Index of the transform.
-        instance: usize,
+        /// Index of the transform, of one that makes so small that the world is beyond [`MAX_COORDINATE`] in the object's space; none for
+        /// undisplaced triangles so large that their arithmetic overflows.
+        instance: Option<usize>,
         /// From where rays could come.
         reach: f32,
         /// The largest coordinate of the world.
         world: f32,
     },
+}
+
+fn part(instance: Option<usize>) -> String {
+    match instance {
+        Some(instance) => format!("instance {instance}"),
+        None => "a mesh of its size without displacement".into(),
+    }
 }
 
 impl WorldError {
@@ -84,54 +92,84 @@ impl World {
     ///
     /// The first object or instance whose box or transform is beyond what trees take.
     pub fn ray_reach(&self) -> Result<RayReach, WorldError> {
-        let mut size = 0f32;
-        let mut all = RayReach::default();
-        // The instance that leaves the least.
-        let mut tightest = (0, 0);
+        let mut parts = Parts::default();
         for (object, described) in self.objects().iter().enumerate() {
-            let own =
-                own_bounds(&described.shape).map_err(|(prim, bounds)| WorldError::Bounds {
-                    object,
-                    prim,
-                    bounds,
-                })?;
-            let Placement::Instances(transforms) = &described.placement else {
-                size = size.max(own.reach());
-                continue;
-            };
-            for (instance, transform) in transforms.iter().enumerate() {
-                let reach = all
-                    .through(transform)
-                    .map_err(|source| WorldError::Transform {
-                        object,
-                        instance,
-                        source,
-                    })?;
-                if reach != all {
-                    (all, tightest) = (reach, (object, instance));
-                }
-                let bounds = placed(own, transform);
-                if !bounds.is_traceable() {
-                    return Err(WorldError::Placed {
-                        object,
-                        instance,
-                        bounds,
-                    });
-                }
-                size = size.max(bounds.reach());
-            }
+            parts.add(object, described)?;
         }
-        if all.origin() < (SURROUNDINGS * size).min(0.5 * MAX_COORDINATE) {
-            let (object, instance) = tightest;
+        let (reach, world) = (parts.reach.origin(), parts.size);
+        // Far out there is less around, and nobody to blame.
+        if reach < (SURROUNDINGS * world).min(0.5 * MAX_COORDINATE) {
+            let (object, instance) = parts.tightest;
             return Err(WorldError::Surroundings {
                 object,
                 instance,
-                reach: all.origin(),
-                world: size,
+                reach,
+                world,
             });
         }
-        Ok(all)
+        Ok(parts.reach)
     }
+}
+
+/// What is known of the objects so far.
+#[derive(Default)]
+struct Parts {
+    reach: RayReach,
+    /// The object, and its instance, that leaves the least.
+    tightest: (usize, Option<usize>),
+    /// The largest coordinate.
+    size: f32,
+}
+
+impl Parts {
+    fn add(&mut self, object: usize, described: &Object) -> Result<(), WorldError> {
+        let own = own_bounds(&described.shape).map_err(|(prim, bounds)| WorldError::Bounds {
+            object,
+            prim,
+            bounds,
+        })?;
+        let largest = match &described.shape {
+            Shape::Displaced(_) => MAX_COORDINATE,
+            Shape::Triangles(_) => triangle_reach(own),
+        };
+        let Placement::Instances(transforms) = &described.placement else {
+            self.narrow(self.reach.up_to(largest), own, (object, None));
+            return Ok(());
+        };
+        for (instance, transform) in transforms.iter().enumerate() {
+            let reach = self.reach.through_to(transform, largest);
+            let reach = reach.map_err(|source| WorldError::Transform {
+                object,
+                instance,
+                source,
+            })?;
+            let bounds = placed(own, transform);
+            if !bounds.is_traceable() {
+                return Err(WorldError::Placed {
+                    object,
+                    instance,
+                    bounds,
+                });
+            }
+            self.narrow(reach, bounds, (object, Some(instance)));
+        }
+        Ok(())
+    }
+
+    fn narrow(&mut self, reach: RayReach, bounds: Aabb, part: (usize, Option<usize>)) {
+        if reach != self.reach {
+            (self.reach, self.tightest) = (reach, part);
+        }
+        self.size = self.size.max(bounds.reach());
+    }
+}
+
+/// From how far rays may come to undisplaced triangles of a mesh within this box: Embree takes t from 2 (v - o) . Ng, which is at
+/// most 12 (|v| + |o|) e^2 for edges up to e.
+fn triangle_reach(bounds: Aabb) -> f32 {
+    const LARGEST: f32 = f32::MAX / 13.0;
+    let edge = (bounds.max - bounds.min).max_element();
+    (LARGEST / edge / edge - bounds.reach()).clamp(0.0, MAX_COORDINATE)
 }
 
 /// The box over a shape in its own space, or the first primitive whose box no backend takes.

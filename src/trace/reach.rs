@@ -87,6 +87,22 @@ impl RayReach {
     ///
     /// A transform that no backend takes.
     pub fn through(self, to_world: &Affine3A) -> Result<Self, TransformError> {
+        self.through_to(to_world, MAX_COORDINATE)
+    }
+
+    /// What is left of it where an object in world space takes rays from within `largest` only.
+    pub(super) fn up_to(self, largest: f32) -> Self {
+        Self {
+            origin: self.origin.min(largest),
+        }
+    }
+
+    /// [`through`](Self::through), and rays of at most this largest coordinate in the object's space.
+    pub(super) fn through_to(
+        self,
+        to_world: &Affine3A,
+        largest: f32,
+    ) -> Result<Self, TransformError> {
         let matrix = Mat3::from(to_world.matrix3).as_dmat3();
         let translation = to_world.translation.abs().max_element();
         let columns = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec3::abs);
@@ -113,11 +129,9 @@ impl RayReach {
                 });
             }
         }
-        let origin = (f64::from(MAX_COORDINATE) / back) as f32 - translation;
+        let origin = (f64::from(largest) / back) as f32 - translation;
         if origin > 0.0 {
-            Ok(Self {
-                origin: self.origin.min(origin),
-            })
+            Ok(self.up_to(origin))
         } else {
             Err(TransformError::TooFar {
                 translation,
