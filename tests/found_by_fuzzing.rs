@@ -156,8 +156,8 @@ fn maps_repeated_a_thousand_times() {
 
 /// No ray hangs on as many texels.
 #[test]
-fn texture_coordinates_of_ten_to_the_fifteen() {
-    for coordinate in [1e6, 1e15] {
+fn texture_coordinates_of_ten_million() {
+    for coordinate in [1e6, 1.6e7] {
         let mesh = mesh([
             (Vec3::ZERO, Vec3::Z, vec2(0.0, 1.0)),
             (vec3(-3.545_166, 0.017_334, 0.0), Vec3::Z, Vec2::ZERO),
@@ -374,7 +374,7 @@ fn surfaces_shrunk_to_a_line() {
         (Vec3::ZERO, Vec3::ZERO, Vec2::ZERO),
     ]);
     let map = DisplacementMap::new(1, 1, Texels::U8(vec![0]), Wrap::Repeat).unwrap();
-    let mut scene = Scene::exact(mesh, map, 1e15, 1e15);
+    let mut scene = Scene::exact(mesh, map, 1e9, 1e9);
     scene.options.march = March::Uniform {
         step: Step::Texels(0.25),
         jitter: false,
