@@ -7,7 +7,6 @@ mod packet;
 use glam::Vec3;
 
 pub use cone::{Cone, Footprint};
-pub(crate) use leveled::Leveled;
 pub use packet::{RayPacket, lanes_of};
 
 /// The largest coordinate of an origin, a direction, a scene or a point that is asked about, of either sign.

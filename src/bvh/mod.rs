@@ -22,7 +22,7 @@ use thiserror::Error;
 use crate::ray::{Aabb, Ray};
 use crate::surface::{DisplacementMap, TexelRect};
 use crate::trace::{
-    Asked, Edited, Hit, INVALID_ID, Placement, RayReach, Tracer, World, WorldError, grown, placed,
+    Edited, Hit, INVALID_ID, Placement, RayReach, Tracer, World, WorldError, grown, placed,
 };
 use object::{Closest, ObjectTree, boxes};
 use tree::Tree;
@@ -237,23 +237,13 @@ impl BvhTracer {
 
 impl Tracer for BvhTracer {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        match self.reach.asked(ray)? {
-            Asked::AsItIs => self.intersect_asked(ray),
-            Asked::Leveled(leveled) => {
-                let hit = self.intersect_asked(&leveled.ray)?;
-                let t = leveled.original_t(hit.t)?;
-                Some(Hit { t, ..hit })
-            }
-        }
+        self.reach.intersect(ray, |ray| self.intersect_asked(ray))
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        match self.reach.asked(ray) {
-            None => false,
-            Some(Asked::AsItIs) => self.occluded_asked(ray),
-            // A hit counts by its own t.
-            Some(Asked::Leveled(_)) => self.intersect(ray).is_some(),
-        }
+        let ask = |ray: &Ray| self.occluded_asked(ray);
+        let first = |ray: &Ray| self.intersect_asked(ray);
+        self.reach.occluded(ray, ask, first)
     }
 
     fn bounds(&self) -> Aabb {

@@ -79,6 +79,7 @@ impl Geometry {
 
     /// Lets `filter` decide of every candidate hit whether it counts; a rejected one lets the ray go on to
     /// what is behind. Called from many threads, in no order, also for hits that turn out not to be the first.
+    /// A ray whose direction is far from length 1 is shown along one near it, with the t of that.
     pub fn with_filter(mut self, filter: HitFilter) -> Self {
         let data = Arc::new(FilterData::new(filter, self.device.faults()));
         // SAFETY: a live geometry that no scene has yet; `data` is dropped after it is freed.

@@ -10,7 +10,7 @@ use super::user::packet_to_raw;
 use super::{Device, EmbreeError, Geometry, HitTest, Instance, Prototype, sys};
 use crate::ray::{Aabb, Ray, RayPacket, lanes_of, time_within};
 use crate::surface::PointQuery;
-use crate::trace::{Asked, Closest, Hit, MAX_INSTANCE_LEVELS, RayReach};
+use crate::trace::{Closest, Hit, MAX_INSTANCE_LEVELS, RayReach};
 
 const _: () = assert!(MAX_INSTANCE_LEVELS == sys::PM_INSTANCE_LEVELS as usize);
 
@@ -358,14 +358,7 @@ impl Scene {
 
     /// The first hit with t in (tnear, tfar); none for a ray that is not within [`ray_reach`](Self::ray_reach).
     pub fn intersect1(&self, ray: &Ray) -> Option<Hit> {
-        match self.0.reach.asked(ray)? {
-            Asked::AsItIs => self.intersect_asked(ray),
-            Asked::Leveled(leveled) => {
-                let hit = self.intersect_asked(&leveled.ray)?;
-                let t = leveled.original_t(hit.t)?;
-                Some(Hit { t, ..hit })
-            }
-        }
+        self.0.reach.intersect(ray, |ray| self.intersect_asked(ray))
     }
 
     #[inline(always)]
@@ -378,13 +371,10 @@ impl Scene {
 
     /// Whether there is any hit with t in (tnear, tfar).
     pub fn occluded1(&self, ray: &Ray) -> bool {
-        match self.0.reach.asked(ray) {
-            None => false,
-            // SAFETY: a live, committed scene; the shim reads the ray.
-            Some(Asked::AsItIs) => unsafe { sys::pm_occluded1(self.raw(), &ray_to_raw(ray)) },
-            // A hit counts by its own t.
-            Some(Asked::Leveled(_)) => self.intersect1(ray).is_some(),
-        }
+        // SAFETY: a live, committed scene; the shim reads the ray.
+        let ask = |ray: &Ray| unsafe { sys::pm_occluded1(self.raw(), &ray_to_raw(ray)) };
+        let first = |ray: &Ray| self.intersect_asked(ray);
+        self.0.reach.occluded(ray, ask, first)
     }
 
     /// The nearest point of the user geometries, by their [`HitTest::closest`], no further than `radius` (which may be infinite); none for a

@@ -14,7 +14,6 @@ pub(crate) use edit::grown;
 pub use limits::WorldError;
 pub(crate) use limits::placed;
 pub use offset::RayOffset;
-pub(crate) use reach::Asked;
 pub use reach::{MAX_STRETCH, RayReach, TransformError};
 pub use world::{Object, PlacedObject, Placement, Resolved, Shape, World};
 

@@ -7,7 +7,8 @@
 use glam::{Affine3A, DVec3, Mat3};
 use thiserror::Error;
 
-use crate::ray::{Leveled, MAX_COORDINATE, Ray, RayPacket};
+use super::Hit;
+use crate::ray::{MAX_COORDINATE, Ray, RayPacket};
 
 /// The most by which an instance's transform may make lengths larger, or smaller.
 pub const MAX_STRETCH: f32 = 1e12;
@@ -150,25 +151,43 @@ fn products(a: DVec3, b: DVec3) -> DVec3 {
     )
 }
 
-/// A ray as a tree is asked about it: [level](Ray::is_level), most often as it is.
-pub(crate) enum Asked {
-    AsItIs,
-    Leveled(Leveled),
-}
-
 impl RayReach {
-    /// How a tree is to be asked about the ray; `None` if it hits nothing.
+    /// The first hit of `ray`; `ask` is asked about rays with a direction near length 1 only.
     #[inline(always)]
-    pub(crate) fn asked(&self, ray: &Ray) -> Option<Asked> {
+    pub(crate) fn intersect(&self, ray: &Ray, ask: impl Fn(&Ray) -> Option<Hit>) -> Option<Hit> {
         if !self.admits(ray) {
             return None;
         }
-        Some(if ray.is_level() {
-            Asked::AsItIs
+        if ray.is_level() {
+            ask(ray)
         } else {
-            Asked::Leveled(ray.leveled())
-        })
+            intersect_leveled(ray, &ask)
+        }
     }
+
+    /// Whether there is any hit. A ray with another direction is asked for its first hit: that counts by its own t.
+    #[inline(always)]
+    pub(crate) fn occluded(
+        &self,
+        ray: &Ray,
+        ask: impl Fn(&Ray) -> bool,
+        first: impl Fn(&Ray) -> Option<Hit>,
+    ) -> bool {
+        self.admits(ray)
+            && if ray.is_level() {
+                ask(ray)
+            } else {
+                intersect_leveled(ray, &first).is_some()
+            }
+    }
+}
+
+#[cold]
+fn intersect_leveled(ray: &Ray, ask: &dyn Fn(&Ray) -> Option<Hit>) -> Option<Hit> {
+    let leveled = ray.leveled();
+    let hit = ask(&leveled.ray)?;
+    let t = leveled.original_t(hit.t)?;
+    Some(Hit { t, ..hit })
 }
 
 #[cfg(test)]
