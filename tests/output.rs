@@ -61,6 +61,29 @@ fn attributes(folder: &Folder, name: &str) -> BTreeMap<String, String> {
 }
 
 #[test]
+fn pictures_do_not_depend_on_the_simd_level() {
+    let folder = folder();
+    for look in ["--lod cone", "--lod off", "--march uniform --dt 2"] {
+        for spp in [1, 8] {
+            let arguments = format!("render scene.toml {look} --spp {spp} -o");
+            done(&folder, &format!("{arguments} usual.exr"));
+            let baseline = format!("{arguments} baseline.exr");
+            let baseline: Vec<&str> = baseline.split(' ').collect();
+            let output = folder.run_at_baseline(&baseline);
+            assert!(output.status.success(), "{}", stderr(&output));
+            let (usual, baseline) = (
+                pixels(&folder, "usual.exr"),
+                pixels(&folder, "baseline.exr"),
+            );
+            assert!(usual.1.len() > 10);
+            for (name, bits) in &usual.1 {
+                assert_eq!(bits, &baseline.1[name], "{look}, {spp}: {name}");
+            }
+        }
+    }
+}
+
+#[test]
 fn tiles_of_any_size_on_any_threads_merge_to_the_whole() {
     let folder = folder();
     for options in [

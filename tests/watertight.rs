@@ -10,9 +10,10 @@ use std::sync::Arc;
 
 use common::closed::{self, Closed};
 use common::numbers::Numbers;
-use glam::vec3;
+use glam::{Vec3, vec3};
 use oracle::{EDGE, Line, Oracle};
 use prismarch::ray::Ray;
+use prismarch::surface::{DisplacedSurface, MeshBuilder, NormalMode};
 use prismarch::trace::{Object, Placement, Shape, Tracer, World};
 
 /// Lines per mesh, and as many rays from inside.
@@ -108,6 +109,81 @@ fn a_restart_before_a_texel_line_misses_nothing() {
         let off = (f64::from(hit.t) - crossing.t).abs();
         assert!(off < 3e-7, "{hit:?} {crossing:?}");
         ray.tnear = hit.t;
+    }
+}
+
+/// The same surface from triangles that stand alone, every number of every corner rounded up or down to six digits by chance.
+fn written_corner_by_corner(closed: &Closed) -> MeshBuilder {
+    let mut numbers = Numbers::new(77);
+    let mut rounded = |x: f32| {
+        let unit = 10f64.powf(f64::from(x.abs()).log10().floor() - 5.0);
+        let whole = (f64::from(x) / unit + f64::from(numbers.number())).floor();
+        if x == 0.0 { x } else { (whole * unit) as f32 }
+    };
+    let mesh = closed.surface.mesh();
+    let mut soup = MeshBuilder::default();
+    for &i in mesh.triangles().as_flattened() {
+        let i = i as usize;
+        let [p, n, st] = [
+            mesh.positions()[i],
+            mesh.normals()[i],
+            mesh.texcoords()[i].extend(0.0),
+        ]
+        .map(|v| Vec3::from(v.to_array().map(&mut rounded)));
+        soup.positions.push(p);
+        soup.normals.push(n);
+        soup.texcoords.push(st.truncate());
+    }
+    soup.triangles = (0..soup.positions.len() as u32 / 3)
+        .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+        .collect();
+    soup
+}
+
+/// Joined, a mesh whose corners differ by rounding is as tight as the one that it was, and as smooth.
+#[cfg(feature = "bvh")]
+#[test]
+fn corners_that_differ_by_rounding_leave_no_holes() {
+    for (closed, has_normals) in closed::all()
+        .into_iter()
+        .zip([true, false].into_iter().cycle())
+    {
+        let exact = closed.surface.mesh();
+        let mut soup = written_corner_by_corner(&closed);
+        if !has_normals {
+            soup.normals.clear();
+        }
+        let joined = soup.join(soup.rounding()).unwrap();
+        assert!(joined.positions > 0 && joined.farthest <= soup.rounding());
+        let (mesh, _) = soup.build(NormalMode::File).unwrap();
+        assert_eq!(mesh.triangles().len(), exact.triangles().len());
+        let of_exact = exact.triangles().as_flattened();
+        for (&i, &j) in mesh.triangles().as_flattened().iter().zip(of_exact) {
+            let (i, j) = (i as usize, j as usize);
+            assert!(mesh.positions()[i].distance(exact.positions()[j]) < 3e-5);
+            // Computed ones are those of the sphere only about.
+            let most = if has_normals { 3e-5 } else { 0.6 };
+            assert!(mesh.normals()[i].distance(exact.normals()[j]) < most);
+        }
+        let surface = DisplacedSurface::new(
+            Arc::new(mesh),
+            closed.surface.map().clone(),
+            *closed.surface.displacement(),
+        );
+        let joined = Closed {
+            surface: Arc::new(surface.unwrap()),
+            ..closed
+        };
+        let tracer = prismarch::bvh::BvhTracer::new(&world(&joined)).unwrap();
+        let faults = closed::faults(&joined, &tracer, COUNT / 2, 5);
+        assert!(faults.escaped.is_empty(), "{}: {faults:?}", joined.name);
+        let oracle = Oracle::new(&joined.surface);
+        let odd: Vec<_> = faults
+            .odd
+            .iter()
+            .filter(|line| !oracle.is_tied(line))
+            .collect();
+        assert!(odd.is_empty(), "{}: {odd:?}", joined.name);
     }
 }
 

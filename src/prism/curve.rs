@@ -130,8 +130,8 @@ impl<Q: Quad> View<Q> {
         let (ax1, ay1, ex1, ey1) = (ax.rotate(), ay.rotate(), ex.rotate(), ey.rotate());
         let (ax2, ay2, ex2, ey2) = (ax1.rotate(), ay1.rotate(), ex1.rotate(), ey1.rotate());
         let reach = Q::splat(reach);
-        let widest_x = ex.abs().mul_add(reach, ax.abs());
-        let widest_y = ey.abs().mul_add(reach, ay.abs());
+        let widest_x = ex.abs() * reach + ax.abs();
+        let widest_y = ey.abs() * reach + ay.abs();
         let (dx, dy, dz) = (nx.rotate() - nx, ny.rotate() - ny, nz.rotate() - nz);
         Self {
             areas: [
@@ -142,7 +142,7 @@ impl<Q: Quad> View<Q> {
             depth: [depth, nz],
             width: widest_x.max(widest_y).max_of_three(),
             tie: [ax2 - ax1, ay2 - ay1],
-            spread: dx.mul_add(dx, dy.mul_add(dy, dz * dz)),
+            spread: dx * dx + (dy * dy + dz * dz),
         }
     }
 
@@ -169,10 +169,7 @@ impl<Q: Quad> View<Q> {
         let [c0, c1, c2] = self.areas;
         // Bernstein coefficients over the range enclose each Q_i.
         let (first, last) = (self.at(low), self.at(high));
-        let middle = c2.mul_add(
-            Q::splat(low * high),
-            c1.mul_add(Q::splat(0.5 * (low + high)), c0),
-        );
+        let middle = c2 * Q::splat(low * high) + (c1 * Q::splat(0.5 * (low + high)) + c0);
         let least = first.min(last).min(middle);
         let most = first.max(last).max(middle);
         let above = (Q::splat(0.0) - least).sign_mask() & 7;
@@ -457,7 +454,7 @@ impl<Q: Quad> Curve<Q> {
     /// w at s.
     #[inline(always)]
     pub fn w(&self, s: f64) -> f64 {
-        s.mul_add(self.w[1], self.w[0])
+        s * self.w[1] + self.w[0]
     }
 
     /// Ray parameters at both ends.
@@ -507,7 +504,7 @@ impl<Q: Quad> Curve<Q> {
 /// c0 + c1 s + c2 s^2.
 #[inline(always)]
 pub fn quadratic<Q: Quad>(c: &[Q; 3], s: Q) -> Q {
-    c[2].mul_add(s, c[1]).mul_add(s, c[0])
+    (c[2] * s + c[1]) * s + c[0]
 }
 
 /// The quadratic of r that c is of s = start + change r.
@@ -515,7 +512,7 @@ pub fn quadratic<Q: Quad>(c: &[Q; 3], s: Q) -> Q {
 fn stretched<Q: Quad>(c: &[Q; 3], start: Q, change: Q) -> [Q; 3] {
     [
         quadratic(c, start),
-        change * (c[2] + c[2]).mul_add(start, c[1]),
+        change * ((c[2] + c[2]) * start + c[1]),
         change * change * c[2],
     ]
 }
@@ -524,6 +521,5 @@ fn stretched<Q: Quad>(c: &[Q; 3], start: Q, change: Q) -> [Q; 3] {
 #[inline(always)]
 fn weighted<Q: Quad>(c: Q, vectors: &[Q; 3]) -> Q {
     let rest = c.broadcast::<2>() * vectors[2];
-    c.broadcast::<0>()
-        .mul_add(vectors[0], c.broadcast::<1>().mul_add(vectors[1], rest))
+    c.broadcast::<0>() * vectors[0] + (c.broadcast::<1>() * vectors[1] + rest)
 }

@@ -20,8 +20,8 @@ use super::{Camera, Film, Integrator, Light, Material, ObjectShape, Scene, Scene
 use crate::image::Channel;
 use crate::prism::{March, PrismOptions};
 use crate::surface::{
-    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Projection,
-    Seams, SurfaceError, Wrap,
+    BaseMesh, DisplacedSurface, Displacement, DisplacementMap, Joined, MeshBuilder, NormalMode,
+    Projection, Seams, SurfaceError, Wrap,
 };
 use assets::Assets;
 
@@ -145,6 +145,8 @@ struct Shaping {
     recompute_normals: bool,
     /// Radians.
     crease_angle: f32,
+    /// World units; by the mesh's size where nothing is said.
+    join: Option<f32>,
 }
 
 impl Default for Shaping {
@@ -153,6 +155,7 @@ impl Default for Shaping {
             transform: Affine3A::IDENTITY,
             recompute_normals: false,
             crease_angle: PI,
+            join: None,
         }
     }
 }
@@ -177,6 +180,7 @@ impl Builder {
             transform: table.transform,
             recompute_normals: table.recompute_normals,
             crease_angle: table.crease_angle,
+            join: table.join,
         };
         let mut loaded = load_mesh(path).map_err(|e| asset(e.into()))?;
         if let Some(projection) = table.texcoords {
@@ -244,14 +248,19 @@ impl Builder {
                 crease_angle: shaping.crease_angle,
             }
         };
-        let (mesh, report) = mesh
-            .transformed(&shaping.transform)
-            .build(normals)
-            .map_err(|source| AssetError::Geometry {
-                path: path.to_owned(),
-                part: name.to_owned(),
-                source,
-            })?;
+        let mut mesh = mesh.transformed(&shaping.transform);
+        let tolerance = shaping.join.unwrap_or_else(|| mesh.rounding());
+        let built = mesh
+            .join(tolerance)
+            .and_then(|joined| Ok((joined, mesh.build(normals)?)));
+        let (joined, (mesh, report)) = built.map_err(|source| AssetError::Geometry {
+            path: path.to_owned(),
+            part: name.to_owned(),
+            source,
+        })?;
+        if let Some(what) = told(&joined) {
+            self.warn(path, format!("{name}: {what}"));
+        }
         if report.degenerate_dropped > 0 {
             let dropped = report.degenerate_dropped;
             self.warn(
@@ -408,6 +417,33 @@ impl Builder {
             },
         }
     }
+}
+
+/// What was joined, if anything.
+fn told(joined: &Joined) -> Option<String> {
+    let Joined {
+        positions,
+        farthest,
+        normals,
+        texcoords,
+    } = *joined;
+    let vertices = format!("{positions} vertices up to {farthest:.1e} away from others");
+    let parts = [
+        (positions, vertices),
+        (normals, format!("{normals} normals")),
+        (
+            texcoords,
+            format!("{texcoords} pairs of texture coordinates"),
+        ),
+    ];
+    let parts: Vec<_> = parts
+        .into_iter()
+        .filter_map(|(count, part)| (count > 0).then_some(part))
+        .collect();
+    (!parts.is_empty()).then(|| {
+        let parts = parts.join(", ");
+        format!("joined what differs by rounding: {parts} (join = 0 keeps them apart)")
+    })
 }
 
 fn displaced(

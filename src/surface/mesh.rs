@@ -126,8 +126,8 @@ impl MeshBuilder {
     ///
     /// The order of the remaining triangles and of their corners stays. A face has no area when its
     /// height over its longest edge is below 2^-23 of that edge: single precision knows no normal for it.
-    /// Vertices at the same position (bit for bit) get the same computed normal, bit for bit, unless a
-    /// crease parts them; so a seam of the texture coordinates neither creases nor cracks.
+    /// Vertices at the same position (bit for bit; [`join`](Self::join) makes it so where rounding did not) get the same computed
+    /// normal, bit for bit, unless a crease parts them; so a seam of the texture coordinates neither creases nor cracks.
     ///
     /// In [`NormalMode::File`] a zero normal is replaced by the computed one. Normals that point against
     /// their face are kept: they are the artist's.

@@ -16,6 +16,7 @@ mod edit;
 mod footprint;
 mod grid;
 mod interpolate;
+mod join;
 mod map;
 mod means;
 mod mesh;
@@ -34,6 +35,7 @@ pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
 pub use edit::{TexelRect, Update};
 pub use grid::HeightSample;
 pub use interpolate::{InterpolateError, Interpolated};
+pub use join::Joined;
 pub use map::{DisplacementMap, MapError};
 #[cfg(feature = "embree")] // for the C library
 pub(crate) use mesh::has_area;

@@ -78,6 +78,13 @@ impl Folder {
         self.run_with_input(arguments, "")
     }
 
+    /// Runs the program here with kernels of the lowest SIMD level.
+    pub fn run_at_baseline(&self, arguments: &[&str]) -> Output {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_prismarch"));
+        program.env("PRISMARCH_SIMD", "baseline");
+        self.finish(program, arguments, "")
+    }
+
     pub fn run_with_input(&self, arguments: &[&str], input: &str) -> Output {
         let program = Command::new(env!("CARGO_BIN_EXE_prismarch"));
         self.finish(program, arguments, input)

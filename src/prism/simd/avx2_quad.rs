@@ -76,12 +76,6 @@ impl Quad for Avx2Quad {
     }
 
     #[inline(always)]
-    fn mul_add(self, a: Self, b: Self) -> Self {
-        // SAFETY: FMA is there wherever an `Avx2Quad` is.
-        Self(unsafe { _mm256_fmadd_pd(self.0, a.0, b.0) })
-    }
-
-    #[inline(always)]
     fn min(self, other: Self) -> Self {
         // SAFETY: AVX is there wherever an `Avx2Quad` is.
         Self(unsafe { _mm256_min_pd(self.0, other.0) })

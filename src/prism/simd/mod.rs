@@ -89,9 +89,9 @@ pub(crate) trait Lanes:
     fn to_array(self) -> [f32; LANES];
     /// The floats whose bits are stored; each is read whole, whoever writes meanwhile.
     fn from_bits(bits: &[AtomicU32; LANES]) -> Self;
-    /// self * a + b, fused where the machine can.
+    /// self * a + b, rounded once.
     fn mul_add(self, a: Self, b: Self) -> Self;
-    /// b - self * a, fused where the machine can.
+    /// b - self * a, rounded once.
     fn neg_mul_add(self, a: Self, b: Self) -> Self;
     /// `other` where either is NaN.
     fn min(self, other: Self) -> Self;
@@ -534,6 +534,67 @@ mod tests {
         assert_eq!(chosen, [2.0, -2.0, 3.0, 2.0, -5.0, 6.0, 2.0, 8.0]);
         let bits = x.to_array().map(|x| AtomicU32::new(x.to_bits()));
         assert_eq!(L::from_bits(&bits).to_array(), x.to_array());
+    }
+
+    /// The bits of all that lanes do with any numbers but NaN.
+    fn results<L: Lanes>() -> Vec<[u32; LANES]> {
+        let odd = [
+            0.0,
+            -0.0,
+            1.0,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::MIN_POSITIVE,
+            -1e-45,
+            3e38,
+        ];
+        let mut state = 9u64;
+        let mut number = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(5);
+            let bits = (state >> 32) as u32;
+            match bits % 4 {
+                0 => odd[(bits >> 8) as usize % odd.len()],
+                1 => (bits >> 20) as f32 - 2048.0,
+                _ => f32::from_bits(bits & !(1 << 30) | (bits & 1) << 25),
+            }
+        };
+        let mut all = Vec::new();
+        for _ in 0..2000 {
+            let [a, b, c]: [L; 3] =
+                std::array::from_fn(|_| L::from_array(std::array::from_fn(|_| number())));
+            let choice = a.sign_mask();
+            let rows = [
+                a + b,
+                a - b,
+                a * b,
+                a / b,
+                a.mul_add(b, c),
+                a.neg_mul_add(b, c),
+                a.min(b),
+                a.max(b),
+                a.floor(),
+                a.abs().sqrt(),
+                a.select_negative(b, c),
+                L::choose(choice, b, c),
+                a.next(),
+                a.next_of(b),
+                L::splat(a.max_lane()),
+            ];
+            let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
+            all.extend(rows.map(|row| row.to_array().map(bits)));
+        }
+        all
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn levels_agree_to_the_bit() {
+        if SimdLevel::Avx2.is_supported() {
+            let (baseline, avx2) = (results::<Portable>(), results::<Avx2>());
+            for (k, (a, b)) in baseline.iter().zip(&avx2).enumerate() {
+                assert_eq!(a, b, "operation {}", k % 15);
+            }
+        }
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Eight lanes as two of glam's four: SSE2, NEON or plain Rust, whatever the architecture always has.
 
+mod fused;
+
 use std::ops::{Add, Div, Mul, Sub};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -65,12 +67,13 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
 
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
-        self * a + b
+        let sums = fused::mul_add([self.0, self.1], [a.0, a.1], [b.0, b.1]);
+        Self(sums[0], sums[1])
     }
 
     #[inline(always)]
     fn neg_mul_add(self, a: Self, b: Self) -> Self {
-        b - self * a
+        Self(-self.0, -self.1).mul_add(a, b)
     }
 
     #[inline(always)]
@@ -85,7 +88,9 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
 
     #[inline(always)]
     fn floor(self) -> Self {
-        Self(self.0.floor(), self.1.floor())
+        // The floor of -0 is -0, for which glam's SSE2 has 0.
+        let four = |x: Vec4| x.floor().copysign(x);
+        Self(four(self.0), four(self.1))
     }
 
     #[inline(always)]
@@ -100,7 +105,7 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
 
     #[inline(always)]
     fn select_negative(self, a: Self, b: Self) -> Self {
-        let four = |sign: Vec4, a, b| Vec4::select(sign.signum().cmplt(Vec4::ZERO), a, b);
+        let four = |sign: Vec4, a, b| Vec4::select(sign.is_negative_mask(), a, b);
         Self(four(self.0, a.0, b.0), four(self.1, a.1, b.1))
     }
 
@@ -187,6 +192,14 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     }
 }
 
+/// The whole part of a number from 0 to `last`; others, and NaN, become `last`.
+#[inline(always)]
+fn whole(x: f32, last: usize) -> usize {
+    const END: f32 = 2_147_483_648.0;
+    let whole = if x.abs() < END { x as i32 } else { i32::MIN };
+    (whole as u32 as usize).min(last)
+}
+
 /// The range of four blocks for each lane.
 #[inline(always)]
 fn of_blocks<'a, const COUNTED: bool>(
@@ -195,9 +208,8 @@ fn of_blocks<'a, const COUNTED: bool>(
     let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
     for l in 0..LANES {
         let (level, i, j) = blocks(l);
-        // `as usize` turns NaN and negatives into 0.
-        let i = i.map(|i| (i as usize).min(level.width() - 1));
-        let j = j.map(|j| (j as usize).min(level.height() - 1));
+        let i = i.map(|i| whole(i, level.width() - 1));
+        let j = j.map(|j| whole(j, level.height() - 1));
         let ranges = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(a, b)| level.get(i[a], j[b]));
         (low[l], high[l]) = ranges[0];
         for (a, b) in &ranges[1..] {
@@ -214,14 +226,10 @@ fn corners<T: Texel>(
     i: [f32; LANES],
     j: [f32; LANES],
 ) -> [[f32; LANES]; 4] {
-    let [width, height] = grid.size;
+    let [last_i, last_j] = grid.size.map(|side| side as usize - 1);
     let mut out = [[0.0; LANES]; 4];
     for l in 0..LANES {
-        // `as usize` turns NaN and negatives into 0.
-        let (i, j) = (
-            i[l].min(width - 1.0) as usize,
-            j[l].min(height - 1.0) as usize,
-        );
+        let (i, j) = (whole(i[l], last_i), whole(j[l], last_j));
         let at = j * grid.stride + i;
         // One bounds check for the pair.
         let (bottom, top) = (&t[at..at + 2], &t[at + grid.stride..at + grid.stride + 2]);

@@ -35,8 +35,8 @@ impl Real for f64 {
     }
 }
 
-/// Four f64 values: the least that the set-up needs. Additions and products are rounded one by one unless
-/// [`mul_add`](Self::mul_add) is asked for, so that a side's quadratic has the same digits seen from both prisms.
+/// Four f64 values: the least that the set-up needs. Additions and products are rounded one by one, so that a side's quadratic has the same
+/// digits seen from both prisms, and at every level.
 pub(crate) trait Quad: Real {
     fn from_array(x: [f64; 4]) -> Self;
     fn to_array(self) -> [f64; 4];
@@ -44,9 +44,9 @@ pub(crate) trait Quad: Real {
     fn from_three(x: [f32; 3]) -> Self;
     /// Rounded.
     fn to_f32(self) -> Vec4;
-    /// self * a + b, fused where the machine can.
-    fn mul_add(self, a: Self, b: Self) -> Self;
+    /// `other` where either is NaN.
     fn min(self, other: Self) -> Self;
+    /// `other` where either is NaN.
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
     /// The magnitude of `self` with the sign of `sign`.
@@ -152,16 +152,12 @@ impl Quad for PortableQuad {
         Vec4::new(a as f32, b as f32, c as f32, d as f32)
     }
     #[inline(always)]
-    fn mul_add(self, a: Self, b: Self) -> Self {
-        self * a + b
-    }
-    #[inline(always)]
     fn min(self, other: Self) -> Self {
-        self.lanewise(other, f64::min)
+        self.lanewise(other, |a, b| if a < b { a } else { b })
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        self.lanewise(other, f64::max)
+        self.lanewise(other, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
     fn abs(self) -> Self {
@@ -199,7 +195,6 @@ mod tests {
         assert_eq!(x.sign_mask(), 0b1010);
         assert_eq!(y.sqrt().to_array(), [2.0, 3.0, 4.0, 5.0]);
         assert_eq!(y.copysign(x).to_array(), [4.0, -9.0, 16.0, -25.0]);
-        assert_eq!(x.mul_add(y, y).to_array(), [8.0, -9.0, 64.0, 25.0]);
         assert_eq!(x.broadcast::<2>().to_array(), [3.0; 4]);
         assert_eq!(x.max_of_three(), 3.0);
         assert_eq!(x.sum_of_three().to_array()[0], 2.0);

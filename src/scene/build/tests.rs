@@ -318,3 +318,42 @@ fn cameras_of_all_kinds_arrive() {
         Projection::Panorama
     );
 }
+
+#[test]
+fn corners_that_differ_by_rounding_are_joined_and_told() {
+    let folder = folder();
+    let ridge = "v -1 -1 -1\nv 0 0 -1\nv 0 0 1\nv -1 -1 1\nv 0 1e-17 -1\nv 1 -1 -1\nv 1 -1 1\nv 0 1e-17 1\nf 1 4 3 2\nf 5 8 7 6\n";
+    fs::write(folder.path().join("ridge.obj"), ridge).unwrap();
+    let load = |keys: &str| {
+        load(
+            &folder,
+            &format!("[[mesh]]\nfile = \"ridge.obj\"\n{keys}\n"),
+        )
+    };
+    let tips = |loaded: &Loaded| match &loaded.scene.objects[0].shape {
+        ObjectShape::Plain(mesh) => {
+            let top = mesh.positions().iter().zip(mesh.normals());
+            let top = top.filter(|(p, _)| p.x == 0.0);
+            top.map(|(p, n)| (p.y, (n.y * 1000.0).round()))
+                .collect::<Vec<_>>()
+        }
+        ObjectShape::Displaced(..) => panic!("no map was named"),
+    };
+    let joined = load("").unwrap();
+    // Up, where both sides meet.
+    assert_eq!(tips(&joined), [(0.0, 1000.0); 4]);
+    let [warning] = &joined.warnings[..] else {
+        panic!("{:?}", joined.warnings);
+    };
+    for word in ["ridge.obj", "2 vertices", "1.0e-17", "join = 0"] {
+        assert!(warning.contains(word), "{warning}");
+    }
+    let apart = load("join = 0").unwrap();
+    assert!(apart.warnings.is_empty());
+    assert!(tips(&apart).iter().all(|tip| tip.1 == 707.0));
+    let refusal = load("join = -1").unwrap_err().to_string();
+    assert!(
+        refusal.contains("join") && refusal.contains("at least 0"),
+        "{refusal}"
+    );
+}

@@ -32,6 +32,8 @@ pub(in crate::scene) struct MeshTable {
     pub recompute_normals: bool,
     /// Radians, for computed normals.
     pub crease_angle: f32,
+    /// Vertices no farther apart are joined, world units; default: what rounding explains.
+    pub join: Option<f32>,
     /// Texture coordinates instead of the file's.
     pub texcoords: Option<Projection>,
     pub material: Option<Keyed<String>>,
@@ -65,6 +67,7 @@ impl MeshTable {
             "file",
             "normals",
             "crease_angle",
+            "join",
             "texcoords",
             "material",
             "mask",
@@ -85,6 +88,9 @@ impl MeshTable {
                     i.number("degrees from 0 to 180", |x| (0.0..=180.0).contains(&x))
                 })?
                 .map_or(std::f32::consts::PI, f32::to_radians),
+            join: section.optional("join", |i| {
+                i.number("world units, at least 0", |x| x >= 0.0)
+            })?,
             texcoords: section
                 .optional("texcoords", |i| i.word(&TEXCOORDS))?
                 .flatten(),

@@ -48,7 +48,7 @@ pub fn height<Q: Quad>(patch: &Patch<'_>, curve: &Curve<Q>, s: f64) -> Height {
 /// The derivative of a quadratic.
 #[inline(always)]
 fn slope<Q: Quad>(c: &[Q; 3], s: Q) -> Q {
-    (c[2] + c[2]).mul_add(s, c[1])
+    (c[2] + c[2]) * s + c[1]
 }
 
 /// Lines x or y = k that are met between two points about one texel apart.
