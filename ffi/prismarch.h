@@ -55,8 +55,9 @@ typedef enum prismarch_status {
   PRISMARCH_ERROR_DATA = 4,      /* buffers that hold NaN, indices out of range, triangles without area */
   PRISMARCH_ERROR_FILE = 5,      /* a picture that cannot be read */
   PRISMARCH_ERROR_EMBREE = 6,    /* Embree refused, or is of another major version than the library was built against */
-  PRISMARCH_ERROR_IN_FLIGHT = 7, /* an update while rays are in flight; found in builds with debug assertions only */
+  PRISMARCH_ERROR_IN_FLIGHT = 7, /* an update of something in use: by rays, commits, other calls */
   PRISMARCH_ERROR_PANIC = 8,     /* a fault of prismarch's; the handle can still be released */
+  PRISMARCH_ERROR_MEMORY = 9,    /* no memory for what a caller's counts ask for */
   PRISMARCH_STATUS_FORCE_32_BIT = 0x7fffffff
 } prismarch_status;
 
@@ -184,9 +185,23 @@ typedef struct prismarch_surface_desc {
    * time_step_count - 1. 1: nothing moves. At most 129; needs the exact march, open seams, no level of detail. */
   uint32_t time_step_count;
   const prismarch_vertices *later_steps;
+
+  /* Version 0.1.0 ends here. ------------------------------------------------ */
+
+  /* Whether filters will be set for geometries of the surface (rtcSetGeometryIntersectFilterFunction, ...OccludedFilterFunction), which
+   * prismarch cannot see. false lets packets be met side by side and occlusion rays end at any hit; a geometry's filter is then never
+   * asked. (The filter of a call's context with Embree 3 is seen, and asked all the same.) true */
+  bool has_filter;
+  uint8_t reserved[7]; /* 0 */
 } prismarch_surface_desc;
 
+/* Fills the `size` bytes of *desc with the defaults: sizeof(prismarch_surface_desc) as the caller was compiled. */
+prismarch_status prismarch_surface_desc_init_sized(prismarch_surface_desc *desc, size_t size);
+/* C and C++ that include this header pass their size. The function itself, for programs that were compiled before there were sizes and for
+ * bindings that call it by name, fills what version 0.1.0 had and writes nothing behind it. */
 prismarch_status prismarch_surface_desc_init(prismarch_surface_desc *desc);
+#define prismarch_surface_desc_init(desc) prismarch_surface_desc_init_sized((desc), sizeof(prismarch_surface_desc))
+
 /* Triangles without area are never hit; primIDs stay the caller's. */
 prismarch_status prismarch_surface_create(const prismarch_surface_desc *desc, prismarch_surface **surface,
                                           prismarch_error *error);
@@ -238,6 +253,7 @@ prismarch_status prismarch_geometry_create(struct RTCDeviceTy *device, prismarch
  * `geometry` must be one that prismarch made. */
 prismarch_status prismarch_geometry_set_user_data(struct RTCGeometryTy *geometry, void *data, prismarch_error *error);
 void *prismarch_geometry_user_data(struct RTCGeometryTy *geometry);
+bool prismarch_geometry_keeps_surface(void);
 
 /* The nearest point of the surfaces in a scene. */
 typedef struct prismarch_closest_point {

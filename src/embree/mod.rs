@@ -45,6 +45,7 @@ pub use scene::{BuildQuality, Coherence, Scene, SceneBuilder, SceneEdit, SceneOp
 pub use tracer::{EmbreeOptions, EmbreeTracer};
 pub use triangles::TriangleGeometry;
 pub use user::{HitTest, UserGeometry};
+pub(crate) use user::{LARGEST_COORDINATE, reach};
 
 /// The version of the Embree headers this was built with, like `4.3.3`. The library that is loaded may be a
 /// later one of the same major number: [`Device::version`].

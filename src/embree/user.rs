@@ -151,8 +151,19 @@ pub(super) struct Stored<T> {
 /// robust mode does not reach user geometry.
 const PADDING_ULPS: f32 = 8.0;
 
-/// Embree drops boxes that reach further.
-const LARGEST_COORDINATE: f32 = 1.844e18;
+/// Embree drops boxes that reach further, and some builds of it end the process at rays that do.
+pub(crate) const LARGEST_COORDINATE: f32 = 1.844e18;
+
+/// How far a box of a hit test reaches from the origin, along any axis, as Embree gets it; infinite for one that is NaN or inverted.
+pub(crate) fn reach(bounds: Aabb) -> f32 {
+    let padded = bounds.padded(PADDING_ULPS);
+    let reach = padded.min.abs().max(padded.max.abs()).max_element();
+    if padded.is_valid() && reach.is_finite() {
+        reach
+    } else {
+        f32::INFINITY
+    }
+}
 
 impl<T: HitTest + 'static> Stored<T> {
     pub(super) const CALLBACKS: sys::pm_hit_test = sys::pm_hit_test {
@@ -185,10 +196,8 @@ impl<T: HitTest + 'static> Stored<T> {
 
     fn checked_bounds(&self, prim: u32, step: u32) -> Aabb {
         let found = self.test.bounds_at(prim, step as usize);
-        let bounds = found.padded(PADDING_ULPS);
-        let reach = bounds.min.abs().max(bounds.max.abs());
-        if bounds.is_valid() && reach.cmple(Vec3::splat(LARGEST_COORDINATE)).all() {
-            return bounds;
+        if reach(found) <= LARGEST_COORDINATE {
+            return found.padded(PADDING_ULPS);
         }
         self.faults.record(EmbreeError::InvalidBounds {
             prim,
