@@ -4,6 +4,8 @@
 
 #include "shim.h"
 
+#include <stdatomic.h>
+
 #if PM_EMBREE_MAJOR == 3
 #include <embree3/rtcore.h>
 typedef struct RTCIntersectContext query_context;
@@ -21,8 +23,9 @@ struct pm_geometry {
   pm_filter filter; /* NULL: none */
   const void *filter_user;
   pm_scene *instanced; /* NULL: no instance */
-  bool is_foreign;     /* the caller's own: filters get `caller_data`, and may be set behind our back */
-  void *caller_data;
+  bool is_foreign;     /* on a caller's device: filters get `caller_data` */
+  bool may_be_filtered; /* filters may be set behind our back */
+  _Atomic(void *) caller_data;
 };
 
 /* The bounds, intersect, occluded and point query functions of a user geometry whose user data is a pm_geometry. */

@@ -1,6 +1,7 @@
 /* Nearest points: rtcPointQuery over user geometries. */
 #include "embree.h"
 
+#include <math.h>
 #include <string.h>
 
 typedef struct search {
@@ -72,4 +73,12 @@ bool pm_closest1(const pm_scene *scene, const float point[3], float radius, floa
 
 bool pm_closest_in(void *scene, const float point[3], float radius, float time, pm_closest *found) {
   return closest(&(search){.scene = scene, .is_foreign = true}, point, radius, time, found);
+}
+
+bool pm_foreign_is_committed(void *scene) {
+  struct RTCBounds box;
+  box.lower_x = NAN;
+  /* Of a scene that was not committed, or changed since, Embree says nothing but an error. */
+  rtcGetSceneBounds(scene, &box);
+  return !isnan(box.lower_x);
 }

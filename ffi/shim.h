@@ -102,8 +102,9 @@ typedef struct pm_closest {
  * then lanes are asked one by one, as they are wherever there is a filter:
  *   intersect8  fills hits[i] and sets bit i of the result for every lane i that hits.
  *   occluded8   sets bit i for every lane i that is occluded.
- * May be NULL, then nothing is near the geometry:
- *   closest     the nearest point no further than the radius; fills `found`, but for its geom and inst, and returns true. */
+ * May be NULL, then nothing is near the geometry, or nobody is told:
+ *   closest     the nearest point no further than the radius; fills `found`, but for its geom and inst, and returns true.
+ *   begin_filter, end_filter  called around a filter, on its thread; what the first returns is given to the second. */
 typedef struct pm_hit_test {
   void (*bounds)(const void *user, uint32_t prim, uint32_t step, float out[6]);
   bool (*intersect)(const void *user, uint32_t prim, const pm_ray *ray, pm_hit *hit);
@@ -111,6 +112,8 @@ typedef struct pm_hit_test {
   uint32_t (*intersect8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid, pm_hit hits[PM_LANES]);
   uint32_t (*occluded8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid);
   bool (*closest)(const void *user, uint32_t prim, const pm_point_query *query, pm_closest *found);
+  uint32_t (*begin_filter)(const void *user);
+  void (*end_filter)(const void *user, uint32_t begun);
 } pm_hit_test;
 
 /* A regular grid of width x height vertices, `stride` vertices from one row to the next: word for word RTCGrid. */
@@ -201,15 +204,27 @@ bool pm_closest1(const pm_scene *scene, const float point[3], float radius, floa
 
 /* Major version of the Embree that made the device; 0 if it cannot be told. */
 uint32_t pm_foreign_major(void *device);
-/* A user geometry of the device, with one reference; NULL on failure. Once Embree destroys it gone(user) is called, unless that cannot be
- * known on this Embree. */
-void *pm_foreign_new(void *device, const pm_hit_test *test, void *user, uint32_t primitives, uint32_t time_steps,
-                     void (*gone)(void *user));
+/* Of a geometry on a caller's device, what belongs to it here. */
+typedef struct pm_foreign pm_foreign;
+/* Whether this build can notice the end of a geometry at all. */
+bool pm_foreign_can_watch(void);
+/* A user geometry of the device, with one reference; NULL on failure. `has_filter`: callers may set filters. Where the geometry is
+ * watched ending(geometry) is called when Embree begins to destroy it, and after that gone(user); then the pm_foreign is no more. Where it
+ * is not, pm_foreign_free calls gone(user). */
+pm_foreign *pm_foreign_new(void *device, const pm_hit_test *test, void *user, uint32_t primitives, uint32_t time_steps,
+                           bool has_filter, void (*ending)(const void *geometry), void (*gone)(void *user));
+void *pm_foreign_geometry(const pm_foreign *foreign);
+bool pm_foreign_is_watched(const pm_foreign *foreign);
+/* Of a geometry that is not watched, and that nothing traces or commits any more. */
+void pm_foreign_free(pm_foreign *foreign);
+/* What filters get as their user data; NULL at first. */
+void pm_foreign_set_caller_data(pm_foreign *foreign, void *data);
+void *pm_foreign_caller_data(const pm_foreign *foreign);
 void pm_foreign_release(void *geometry);
 /* Commits and attaches: the geomID. */
 uint32_t pm_foreign_attach(void *scene, void *geometry);
-void pm_foreign_set_caller_data(void *geometry, void *data);
-void *pm_foreign_caller_data(void *geometry);
+/* Whether a scene is committed, and unchanged since; where it is not Embree reports an error, too. */
+bool pm_foreign_is_committed(void *scene);
 /* pm_closest1 in a scene whose instances are not entered. */
 bool pm_closest_in(void *scene, const float point[3], float radius, float time, pm_closest *found);
 

@@ -35,13 +35,13 @@ static void invoke_occluded_filter(const void *args, const struct RTCFilterFunct
 }
 
 /* Without a filter, whether a ray is occluded needs no hit, and the first hit of a primitive is final. What filters a
- * caller has set cannot be seen from here. */
+ * caller has set for a geometry cannot be seen from here. */
 static inline bool has_filter(const struct pm_geometry *g, const query_context *context) {
 #if PM_EMBREE_MAJOR == 3
-  return g->filter || g->is_foreign || context->filter;
+  return g->filter || g->may_be_filtered || context->filter;
 #else
   (void)context;
-  return g->filter || g->is_foreign;
+  return g->filter || g->may_be_filtered;
 #endif
 }
 
@@ -68,7 +68,7 @@ typedef struct query {
   const struct pm_geometry *geometry;
   const void *args;
   query_context *context;
-  invoke_filter invoke;
+  invoke_filter invoke; /* NULL: there is no filter */
   unsigned prim, geom;
 } query;
 
@@ -84,16 +84,24 @@ static inline bool first_accepted(const query *q, pm_ray *ray, struct RTCHit *hi
       return false;
     fill_hit(hit, &at, q->geom, q->context);
     ray->tfar = at.t;
+    if (!q->invoke)
+      return true;
     int valid = -1;
     struct RTCFilterFunctionNArguments candidate = {
         .valid = &valid,
-        .geometryUserPtr = q->geometry->is_foreign ? q->geometry->caller_data : (void *)q->geometry,
+        .geometryUserPtr = q->geometry->is_foreign
+                               ? atomic_load_explicit(&q->geometry->caller_data, memory_order_relaxed)
+                               : (void *)q->geometry,
         .context = q->context,
         .ray = (struct RTCRayN *)ray,
         .hit = (struct RTCHitN *)hit,
         .N = 1,
     };
+    const pm_hit_test *test = &q->geometry->test;
+    const uint32_t begun = test->begin_filter ? test->begin_filter(q->geometry->test_user) : 0;
     q->invoke(q->args, &candidate);
+    if (test->end_filter)
+      test->end_filter(q->geometry->test_user, begun);
     if (valid == -1)
       return true;
     ray->tnear = at.t;
@@ -103,8 +111,13 @@ static inline bool first_accepted(const query *q, pm_ray *ray, struct RTCHit *hi
 }
 
 static inline void intersect_lanes(const struct RTCIntersectFunctionNArguments *args, unsigned n) {
-  const query q = {args->geometryUserPtr, args,         args->context,
-                   invoke_intersect_filter, args->primID, args->geomID};
+  const struct pm_geometry *g = args->geometryUserPtr;
+  const query q = {g,
+                   args,
+                   args->context,
+                   has_filter(g, args->context) ? invoke_intersect_filter : NULL,
+                   args->primID,
+                   args->geomID};
   char *rays = (char *)args->rayhit;
   char *hits = rays + (size_t)sizeof(struct RTCRay) * n;
   for (unsigned i = 0; i < n; i++) {
@@ -123,17 +136,20 @@ static inline void intersect_lanes(const struct RTCIntersectFunctionNArguments *
 }
 
 static inline void occluded_lanes(const struct RTCOccludedFunctionNArguments *args, unsigned n) {
-  const query q = {args->geometryUserPtr, args,         args->context,
-                   invoke_occluded_filter, args->primID, args->geomID};
-  const bool filtered = has_filter(q.geometry, args->context);
+  const struct pm_geometry *g = args->geometryUserPtr;
+  const query q = {g,
+                   args,
+                   args->context,
+                   has_filter(g, args->context) ? invoke_occluded_filter : NULL,
+                   args->primID,
+                   args->geomID};
   for (unsigned i = 0; i < n; i++) {
     if (args->valid[i] != -1)
       continue;
     pm_ray ray;
     struct RTCHit hit;
     load_words(&ray, args->ray, RAY_WORDS, n, i);
-    const bool found = filtered ? first_accepted(&q, &ray, &hit)
-                                : q.geometry->test.occluded(q.geometry->test_user, q.prim, &ray);
+    const bool found = q.invoke ? first_accepted(&q, &ray, &hit) : g->test.occluded(g->test_user, q.prim, &ray);
     if (found)
       store_tfar(args->ray, -INFINITY, n, i);
     report(&args->valid[i], found);

@@ -41,6 +41,29 @@ pub enum Primitives {
     Quads(Vec<[u32; 4]>),
 }
 
+impl Primitives {
+    /// Triangles are counted in 32 bits, also those of quads; walls at seams come behind them.
+    pub const MOST: u32 = u32::MAX / 8;
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Triangles(all) => all.len(),
+            Self::Quads(all) => all.len(),
+        }
+    }
+
+    /// Of one primitive.
+    fn triangles(&self, prim: usize) -> [Option<[u32; 3]>; 2] {
+        match self {
+            Self::Triangles(all) => [Some(all[prim]), None],
+            Self::Quads(all) => {
+                let [a, b, c, d] = all[prim];
+                [Some([a, b, d]), Some([c, d, b])]
+            }
+        }
+    }
+}
+
 impl Base {
     /// Leaves out triangles without area (at `positions`), also those of quads with two equal corners, and vertices that nobody uses.
     pub fn new(
@@ -49,21 +72,11 @@ impl Base {
         texcoords: &[[f32; 2]],
     ) -> Result<Self, Failure> {
         let vertex_count = positions.len();
-        let (count, halves) = match primitives {
-            Primitives::Triangles(all) => (
-                all.len(),
-                all.into_iter().map(|t| [Some(t), None]).collect(),
-            ),
-            Primitives::Quads(all) => {
-                let split = |[a, b, c, d]: [u32; 4]| [Some([a, b, d]), Some([c, d, b])];
-                (all.len(), all.into_iter().map(split).collect::<Vec<_>>())
-            }
-        };
+        let count = primitives.len();
         let mut triangles = Vec::new();
         let mut owners = Vec::new();
-        for (prim, halves) in halves.iter().enumerate() {
-            for (second, triangle) in halves.iter().enumerate() {
-                let Some(triangle) = *triangle else { continue };
+        for prim in 0..count {
+            for (second, triangle) in primitives.triangles(prim).into_iter().flatten().enumerate() {
                 if let Some(index) = triangle.iter().find(|&&i| i as usize >= vertex_count) {
                     return Err(Failure::data(format!(
                         "primitive {prim} refers to vertex {index}, but there are {vertex_count} (counted from 0)"

@@ -7,6 +7,7 @@ use super::declarations::{self as c, prismarch_error, prismarch_status};
 use crate::embree::{EmbreeError, panic_message};
 use crate::image::ImageError;
 use crate::prism::MarchError;
+use crate::ray::MAX_COORDINATE;
 use crate::surface::{InterpolateError, MapError, MeshError, MotionError, SurfaceError};
 
 /// A status other than OK, and what to say.
@@ -31,16 +32,44 @@ impl Failure {
     }
 
     pub fn handle(what: &str) -> Self {
-        let message =
-            format!("{what} is no live handle; it was released, or is one of another kind");
+        let message = format!("{what} is no live handle; it was released, or never given");
         Self::new(c::prismarch_status_PRISMARCH_ERROR_HANDLE, message)
+    }
+
+    pub fn other_kind(what: &str, found: &str) -> Self {
+        let message = format!("{what} is the handle of a {found}");
+        Self::new(c::prismarch_status_PRISMARCH_ERROR_HANDLE, message)
+    }
+
+    pub fn geometry() -> Self {
+        Self::new(
+            c::prismarch_status_PRISMARCH_ERROR_HANDLE,
+            "geometry is not one that prismarch made, or was destroyed",
+        )
     }
 
     pub fn in_flight() -> Self {
         Self::new(
             c::prismarch_status_PRISMARCH_ERROR_IN_FLIGHT,
-            "rays are in flight; updates must wait until no ray is",
+            "the surface is in use; updates must wait until no ray is in flight, and no commit or other call is under way",
         )
+    }
+
+    pub fn memory(what: impl Display, bytes: usize) -> Self {
+        Self::new(
+            c::prismarch_status_PRISMARCH_ERROR_MEMORY,
+            format!("{what} take {bytes} bytes, and there is no memory for them"),
+        )
+    }
+
+    pub fn too_far(reach: f32) -> Self {
+        Self::data(format!(
+            "the displaced surface reaches {reach:e} from the origin; Embree takes what is within {MAX_COORDINATE:e}"
+        ))
+    }
+
+    pub fn embree(message: impl Display) -> Self {
+        Self::new(c::prismarch_status_PRISMARCH_ERROR_EMBREE, message)
     }
 
     fn new(status: prismarch_status, message: impl Display) -> Self {
@@ -84,7 +113,7 @@ impl From<MapError> for Failure {
 ///
 /// # Safety
 ///
-/// `error` is null or valid for a write.
+/// `error` is null or valid for a write, at any alignment.
 pub unsafe fn answer(
     error: *mut prismarch_error,
     call: impl FnOnce() -> Result<(), Failure>,
@@ -99,10 +128,14 @@ pub unsafe fn answer(
         Ok(()) => (c::prismarch_status_PRISMARCH_OK, ""),
         Err(failure) => (failure.status, failure.message.as_str()),
     };
-    // SAFETY: the caller's promise.
-    if let Some(error) = unsafe { error.as_mut() } {
-        error.status = status;
-        write_text(&mut error.message, message);
+    if !error.is_null() {
+        let mut told = prismarch_error {
+            status,
+            message: [0; c::PRISMARCH_MESSAGE_SIZE as usize],
+        };
+        write_text(&mut told.message, message);
+        // SAFETY: the caller's promise; no alignment is asked.
+        unsafe { error.write_unaligned(told) };
     }
     status
 }

@@ -10,10 +10,11 @@ use super::declarations::{
     prismarch_status,
 };
 use super::error::{Failure, answer};
-use super::handle::{Handle, output};
+use super::handle::{kept, output, used};
 use super::surface::Surface;
 use crate::embree::HitTest;
 use crate::embree::raw::{self, RawGeometry};
+use crate::ray::MAX_COORDINATE;
 use crate::surface::{ClosestPoint, PointQuery};
 use crate::trace::INVALID_ID;
 
@@ -28,11 +29,20 @@ pub unsafe extern "C" fn prismarch_geometry_create(
     unsafe {
         answer(error, || {
             let out = output(geometry, "geometry")?;
-            let surface = Handle::<Surface>::borrow(surface.cast())?;
+            // Embree may call the caller's memory monitor meanwhile.
+            let surface = kept::<Surface, _>(surface)?;
             let device = NonNull::new(device).ok_or_else(|| Failure::null("device"))?;
-            let (live, faults) = (surface.live.clone(), surface.faults.clone());
-            let made = RawGeometry::with_faults(device.cast(), live, faults)?;
-            *out = made.into_raw().cast().as_ptr();
+            let (live, options) = (surface.live.clone(), surface.options.clone());
+            let made = RawGeometry::with_options(device.cast(), live, options)?;
+            if raw::notices_ends() {
+                *out = made.into_raw().cast().as_ptr();
+                return Ok(());
+            }
+            let (made, unwatched) = made.into_parts();
+            if let Some(unwatched) = unwatched {
+                surface.keep(unwatched);
+            }
+            *out = made.cast().as_ptr();
             Ok(())
         })
     }
@@ -48,19 +58,32 @@ pub unsafe extern "C" fn prismarch_geometry_set_user_data(
     unsafe {
         answer(error, || {
             let geometry = NonNull::new(geometry).ok_or_else(|| Failure::null("geometry"))?;
-            raw::set_caller_data(geometry.cast(), data);
-            Ok(())
+            if raw::set_caller_data(geometry.cast(), data) {
+                Ok(())
+            } else {
+                Err(Failure::geometry())
+            }
         })
     }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn prismarch_geometry_user_data(geometry: *mut RTCGeometryTy) -> *mut c_void {
-    let Some(geometry) = NonNull::new(geometry) else {
-        return std::ptr::null_mut();
+    let mut data = std::ptr::null_mut();
+    // SAFETY: null is no place for an error's text.
+    let _ = unsafe {
+        answer(std::ptr::null_mut(), || {
+            let geometry = NonNull::new(geometry).ok_or_else(|| Failure::null("geometry"))?;
+            data = raw::caller_data(geometry.cast()).ok_or_else(Failure::geometry)?;
+            Ok(())
+        })
     };
-    // SAFETY: a geometry of prismarch's, as the header asks.
-    unsafe { raw::caller_data(geometry.cast()) }
+    data
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn prismarch_geometry_keeps_surface() -> bool {
+    raw::notices_ends()
 }
 
 #[unsafe(no_mangle)]
@@ -79,6 +102,11 @@ pub unsafe extern "C" fn prismarch_closest(
             let scene = NonNull::new(scene).ok_or_else(|| Failure::null("scene"))?;
             let (found, out) = (output(found, "found")?, output(point, "point")?);
             let query = query(position, radius, time, std::ptr::null())?;
+            if !raw::is_committed(scene.cast()) {
+                return Err(Failure::embree(
+                    "the scene is not committed, or was changed since: call rtcCommitScene first",
+                ));
+            }
             let nearest = raw::closest(scene.cast(), query.point, radius, time);
             *found = nearest.is_some();
             if let Some((nearest, geom_id)) = nearest {
@@ -104,7 +132,7 @@ pub unsafe extern "C" fn prismarch_surface_closest(
     // SAFETY: pointers as the header asks.
     unsafe {
         answer(error, || {
-            let surface = Handle::<Surface>::borrow(surface.cast())?;
+            let surface = used::<Surface, _>(surface)?;
             let (found, out) = (output(found, "found")?, output(point, "point")?);
             let query = query(position, radius, time, to_world)?;
             let primitives = surface.live.len();
@@ -147,14 +175,16 @@ unsafe fn query(
             },
         )
     };
-    if !point.is_finite()
-        || !to_world.is_finite()
+    let limit = MAX_COORDINATE;
+    let is_within = |numbers: &[f32]| numbers.iter().all(|x| x.abs() <= limit);
+    if !is_within(&point.to_array())
+        || !is_within(&to_world.to_cols_array())
         || radius.is_nan()
         || radius < 0.0
         || !(0.0..=1.0).contains(&time)
     {
         return Err(Failure::argument(format!(
-            "position {point}, radius {radius}, time {time}, transform {to_world}; expected finite numbers, at least 0, and 0 to 1"
+            "position {point}, radius {radius}, time {time}, transform {to_world}; expected numbers within {limit:e}, at least 0, and 0 to 1"
         )));
     }
     Ok(PointQuery {

@@ -9,29 +9,27 @@ use super::declarations::{
     self as c, prismarch_error, prismarch_status, prismarch_texels, prismarch_wrap,
 };
 use super::error::{Failure, answer};
-use super::handle::{Handle, Kind, output};
-use super::live::Live;
+use super::handle::{give, input, kept, output, release, retain, used};
+use super::live::{Live, Shut};
 use crate::image::{Channel, load_heights};
-use crate::surface::{DisplacementMap, TexelRect, Wrap};
+use crate::ray::MAX_COORDINATE;
+use crate::surface::{DisplacementMap, TexelRect, Texels, Wrap};
 
 /// A map, and who has it.
 pub struct Map {
     pub map: Arc<DisplacementMap>,
     surfaces: Mutex<Vec<Weak<Live>>>,
-}
-
-impl Kind for Map {
-    const MAGIC: u64 = u64::from_le_bytes(*b"pm map 1");
-    const NAME: &'static str = "map";
+    editing: Mutex<()>,
 }
 
 impl Map {
-    fn create(map: DisplacementMap) -> *const Handle<Self> {
-        Handle::new(Self {
+    /// A handle for C.
+    fn create(map: DisplacementMap) -> Result<*mut c::prismarch_map, Failure> {
+        give(Arc::new(Self {
             map: Arc::new(map),
             surfaces: Mutex::default(),
-        })
-        .give()
+            editing: Mutex::default(),
+        }))
     }
 
     /// A surface that edits concern.
@@ -45,6 +43,25 @@ impl Map {
         let all = self.surfaces.lock().unwrap_or_else(PoisonError::into_inner);
         all.iter().filter_map(Weak::upgrade).collect()
     }
+}
+
+/// Whether an edited surface stays within what Embree takes.
+fn check_reach(surface: &Shut, texels: &Texels) -> Result<(), Failure> {
+    let highest = match texels {
+        Texels::U8(_) | Texels::U16(_) => 1.0,
+        Texels::F32(heights) => heights.iter().fold(0.0, |most: f32, h| most.max(h.abs())),
+    };
+    let displacement = surface.now().surface().displacement();
+    let most = displacement.scale.abs() * (highest + displacement.midlevel.abs());
+    // Most surfaces are nowhere near: their boxes are not gone through.
+    if most <= 1e-6 * MAX_COORDINATE {
+        return Ok(());
+    }
+    let reach = surface.now().reach() + most;
+    if reach <= MAX_COORDINATE {
+        return Ok(());
+    }
+    Err(Failure::too_far(reach))
 }
 
 fn wrap_of(wrap: prismarch_wrap) -> Result<Wrap, Failure> {
@@ -84,13 +101,12 @@ pub unsafe extern "C" fn prismarch_map_create(
     unsafe {
         answer(error, || {
             let out = output(map, "map")?;
-            let texels = texels.as_ref().ok_or_else(|| Failure::null("texels"))?;
+            let texels = input(texels, "texels")?;
             let wrap = wrap_of(wrap)?;
             let (width, height) = (width as usize, height as usize);
             DisplacementMap::check_size(width, height)?;
-            let texels = read_texels(texels, width, height)?;
-            let made = DisplacementMap::new(width, height, texels, wrap)?;
-            *out = Map::create(made).cast_mut().cast();
+            let texels = read_texels(&texels, width, height)?;
+            *out = Map::create(DisplacementMap::new(width, height, texels, wrap)?)?;
             Ok(())
         })
     }
@@ -115,8 +131,7 @@ pub unsafe extern "C" fn prismarch_map_load(
                 let Ok(channel) = text(channel, "channel")?.parse();
                 channel
             };
-            let made = load_heights(Path::new(path), &channel, wrap_of(wrap)?)?;
-            *out = Map::create(made).cast_mut().cast();
+            *out = Map::create(load_heights(Path::new(path), &channel, wrap_of(wrap)?)?)?;
             Ok(())
         })
     }
@@ -132,9 +147,9 @@ pub unsafe extern "C" fn prismarch_map_size(
     // SAFETY: pointers as the header asks.
     unsafe {
         answer(error, || {
-            let (w, h) = Handle::<Map>::borrow(map.cast())?.map.size();
-            *output(width, "width")? = w as u32;
-            *output(height, "height")? = h as u32;
+            let (w, h) = used::<Map, _>(map)?.map.size();
+            let (width, height) = (output(width, "width")?, output(height, "height")?);
+            (*width, *height) = (w as u32, h as u32);
             Ok(())
         })
     }
@@ -154,8 +169,8 @@ pub unsafe extern "C" fn prismarch_map_update(
     // SAFETY: pointers as the header asks.
     unsafe {
         answer(error, || {
-            let map = Handle::<Map>::borrow(map.cast())?;
-            let texels = texels.as_ref().ok_or_else(|| Failure::null("texels"))?;
+            let map = kept::<Map, _>(map)?;
+            let texels = input(texels, "texels")?;
             let rect = TexelRect {
                 x: x as usize,
                 y: y as usize,
@@ -171,18 +186,21 @@ pub unsafe extern "C" fn prismarch_map_update(
                     map.map.kind()
                 )));
             }
-            let texels = read_texels(texels, rect.width, rect.height)?;
+            let texels = read_texels(&texels, rect.width, rect.height)?;
+            // One edit of a map at a time: another waits here, before it shuts surfaces.
+            let _one = map.editing.lock().unwrap_or_else(PoisonError::into_inner);
             let surfaces = map.surfaces();
-            if surfaces.iter().any(|live| live.is_traced()) {
-                return Err(Failure::in_flight());
-            }
+            let shut = surfaces.iter().map(|live| live.watch()?.shut());
+            let shut = shut.collect::<Result<Vec<_>, _>>()?;
+            shut.iter()
+                .try_for_each(|surface| check_reach(surface, &texels))?;
             map.map.update(rect, &texels)?;
             let mut grown = false;
-            for live in surfaces {
-                grown |= live.map_edited(rect);
+            for surface in shut {
+                grown |= surface.now().map_edited(rect);
             }
-            if let Some(out) = commit_needed.as_mut() {
-                *out = grown;
+            if !commit_needed.is_null() {
+                commit_needed.write(grown);
             }
             Ok(())
         })
@@ -191,12 +209,10 @@ pub unsafe extern "C" fn prismarch_map_update(
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn prismarch_map_retain(map: *mut c::prismarch_map) -> prismarch_status {
-    // SAFETY: pointers as the header asks.
-    unsafe { Handle::<Map>::retain(map.cast()) }
+    retain::<Map, _>(map)
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn prismarch_map_release(map: *mut c::prismarch_map) -> prismarch_status {
-    // SAFETY: pointers as the header asks.
-    unsafe { Handle::<Map>::release(map.cast()) }
+    release::<Map, _>(map)
 }

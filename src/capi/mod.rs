@@ -1,7 +1,8 @@
 //! The C library: what `ffi/prismarch.h` declares.
 //!
-//! `error` turns results and panics into statuses, `handle` checks pointers, `buffer` reads the caller's arrays, `base` makes meshes of
-//! them; `map`, `surface` and `geometry` have the functions.
+//! `error` turns results and panics into statuses, `handle` looks handles up, `pins` tells who uses what at this moment, `desc` and `buffer` read the
+//! caller's descriptions and arrays, `base` makes meshes of them, `live` is what rays and updates meet in; `map`, `surface` and `geometry` have
+//! the functions.
 
 #![allow(unsafe_code)] // pointers from C; each block says what the caller has promised
 #![allow(clippy::missing_safety_doc)] // the header says what pointers must be
@@ -9,11 +10,13 @@
 mod base;
 mod buffer;
 mod declarations;
+mod desc;
 mod error;
 mod geometry;
 mod handle;
 mod live;
 mod map;
+mod pins;
 mod surface;
 #[cfg(test)]
 mod tests;

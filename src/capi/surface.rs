@@ -3,17 +3,19 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::base::{Base, Primitives};
-use super::buffer::{self, Vertices};
+use super::buffer::{Array, VertexArrays};
 use super::declarations::{
     self as c, prismarch_error, prismarch_point, prismarch_status, prismarch_surface_desc,
     prismarch_vertices,
 };
+use super::desc;
 use super::error::{Failure, answer};
-use super::handle::{Handle, Kind, output};
+use super::handle::{give, input, kept, output, release, retain, used};
 use super::live::{Live, Traced};
 use super::map::Map;
-use crate::embree::Faults;
+use crate::embree::raw::{RawOptions, Unwatched};
 use crate::prism::{EditBounds, Lod, March, MovingPrisms, PrismOptions, Prisms, Step};
+use crate::ray::MAX_COORDINATE;
 use crate::surface::{
     DisplacedSurface, Displacement, Interpolated, MovingSurface, Seams, TimeStep,
 };
@@ -21,15 +23,13 @@ use crate::surface::{
 /// A surface, and how to make it again when its vertices move.
 pub struct Surface {
     pub live: Arc<Live>,
-    pub faults: Arc<Faults>,
-    map: Arc<Handle<Map>>,
+    /// How its geometries are made.
+    pub options: RawOptions,
+    map: Arc<Map>,
     recipe: Recipe,
     steps: Mutex<Vec<TimeStep>>,
-}
-
-impl Kind for Surface {
-    const MAGIC: u64 = u64::from_le_bytes(*b"pm surf1");
-    const NAME: &'static str = "surface";
+    /// Of geometries whose end nobody notices: the header asks that the surface outlives them.
+    unwatched: Mutex<Vec<Unwatched>>,
 }
 
 /// The parameters of a surface.
@@ -89,16 +89,20 @@ impl Recipe {
         let mesh = Arc::new(base.mesh(&steps[0])?);
         let surface = DisplacedSurface::new(mesh, map.map.clone(), self.displacement)?;
         let surface = Arc::new(surface.with_seams(self.seams));
-        if steps.len() == 1 {
+        let traced = if steps.len() == 1 {
             let prisms = Prisms::new(surface, self.options)?;
             prisms.set_spread(self.spread);
-            return Ok(Traced::Standing(prisms));
+            Traced::Standing(prisms)
+        } else {
+            let moving = MovingSurface::new(surface, steps[1..].to_vec())?;
+            Traced::Moving(MovingPrisms::new(Arc::new(moving), self.options)?)
+        };
+        let reach = traced.reach();
+        if reach <= MAX_COORDINATE {
+            Ok(traced)
+        } else {
+            Err(Failure::too_far(reach))
         }
-        let moving = MovingSurface::new(surface, steps[1..].to_vec())?;
-        Ok(Traced::Moving(MovingPrisms::new(
-            Arc::new(moving),
-            self.options,
-        )?))
     }
 }
 
@@ -108,62 +112,53 @@ impl Surface {
     /// The buffers of `desc` are readable.
     unsafe fn new(desc: &prismarch_surface_desc) -> Result<Self, Failure> {
         let recipe = Recipe::new(desc)?;
-        let (vertices, primitives) = (desc.vertex_count as usize, desc.primitive_count as usize);
+        let map = kept::<Map, _>(desc.map)?;
+        let steps = time_steps(desc)?;
+        let vertices = desc.vertex_count as usize;
+        let texcoords: Array<f32, 2> =
+            Array::new(&desc.texcoords, vertices, "texture coordinates")?
+                .ok_or_else(|| Failure::null("texcoords.data"))?;
         // SAFETY: the caller's promise.
-        let (map, indices, first, texcoords) = unsafe {
-            let map = Handle::<Map>::retained(desc.map.cast())?;
-            let null = || Failure::null("indices.data");
-            let indices = match desc.primitive {
-                c::prismarch_primitive_PRISMARCH_TRIANGLES => Primitives::Triangles(
-                    buffer::read(&desc.indices, primitives, "indices")?.ok_or_else(null)?,
-                ),
-                c::prismarch_primitive_PRISMARCH_QUADS => Primitives::Quads(
-                    buffer::read(&desc.indices, primitives, "indices")?.ok_or_else(null)?,
-                ),
-                other => {
-                    return Err(Failure::argument(format!(
-                        "primitive is {other}; expected a prismarch_primitive"
-                    )));
-                }
-            };
-            let first = Vertices::read(&desc.vertices, vertices)?;
-            let texcoords: Vec<[f32; 2]> =
-                buffer::read(&desc.texcoords, vertices, "texture coordinates")?
-                    .ok_or_else(|| Failure::null("texcoords.data"))?;
-            (map, indices, first, texcoords)
+        let (base, steps) = unsafe {
+            let indices = read_primitives(desc)?;
+            let first = VertexArrays::new(&desc.vertices, vertices)?.read()?;
+            let base = Base::new(indices, &first.positions, &texcoords.read()?)?;
+            let mut all = vec![base.step(&first)];
+            drop(first);
+            for k in 1..steps {
+                let later = input(desc.later_steps.wrapping_add(k - 1), "later_steps")?;
+                all.push(base.step(&VertexArrays::new(&later, vertices)?.read()?));
+            }
+            (base, all)
         };
-        let base = Base::new(indices, &first.positions, &texcoords)?;
-        let mut steps = vec![base.step(&first)];
-        let count = desc.time_step_count as usize;
-        if !(1..=MovingSurface::MAX_TIME_STEPS).contains(&count) {
-            return Err(Failure::argument(format!(
-                "time_step_count is {count}; expected 1 to {}",
-                MovingSurface::MAX_TIME_STEPS
-            )));
-        }
-        if count > 1 && desc.later_steps.is_null() {
-            return Err(Failure::null("later_steps"));
-        }
-        for k in 1..count {
-            // SAFETY: one less than the count are readable, and so are their buffers.
-            let later = unsafe { Vertices::read(&*desc.later_steps.add(k - 1), vertices)? };
-            steps.push(base.step(&later));
-        }
         let traced = recipe.traced(&base, &map, &steps)?;
         let live = Arc::new(Live::new(base, traced));
         map.add(&live);
         Ok(Self {
             live,
-            faults: Arc::default(),
+            options: RawOptions {
+                faults: Arc::default(),
+                has_filter: desc.has_filter,
+            },
             map,
             recipe,
             steps: Mutex::new(steps),
+            unwatched: Mutex::default(),
         })
+    }
+
+    /// Keeps what belongs to a geometry until the surface goes.
+    pub fn keep(&self, unwatched: Unwatched) {
+        let mut all = self
+            .unwatched
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        all.push(unwatched);
     }
 
     /// # Safety
     ///
-    /// The buffers of `vertices` are readable, and nothing else looks at the surface.
+    /// The buffers of `vertices` are readable.
     unsafe fn update(&self, step: usize, vertices: &prismarch_vertices) -> Result<(), Failure> {
         let mut steps = self.steps.lock().unwrap_or_else(PoisonError::into_inner);
         if step >= steps.len() {
@@ -173,17 +168,16 @@ impl Surface {
             )));
         }
         let base = &self.live.base;
-        // SAFETY: the caller's promise.
-        let vertices = unsafe { Vertices::read(vertices, base.vertex_count())? };
-        if self.live.is_traced() {
-            return Err(Failure::in_flight());
-        }
+        let vertices = VertexArrays::new(vertices, base.vertex_count())?;
+        let watched = self.live.watch()?;
         let mut new = steps.clone();
-        new[step] = base.step(&vertices);
-        let traced = self.recipe.traced(base, &self.map, &new)?;
         // SAFETY: the caller's promise.
-        unsafe { self.live.replace(traced) };
+        new[step] = base.step(&unsafe { vertices.read()? });
+        let traced = self.recipe.traced(base, &self.map, &new)?;
+        let old = watched.shut()?.replace(traced);
         *steps = new;
+        // Rays go on while it is freed.
+        drop(old);
         Ok(())
     }
 
@@ -197,17 +191,12 @@ impl Surface {
         let at = self.live.base.to_triangle(prim, u, v).ok_or_else(|| {
             Failure::argument(format!("primitive {prim} has no triangle with an area"))
         })?;
-        let mut found = match self.live.now() {
-            Traced::Standing(_) => {
-                self.live
-                    .now()
-                    .surface()
-                    .interpolate(at.triangle, at.u, at.v)?
-            }
+        let within = self.live.enter();
+        let mut found = match within.now() {
+            Traced::Standing(prisms) => prisms.surface().interpolate(at.triangle, at.u, at.v)?,
             Traced::Moving(moving) => {
-                moving
-                    .surface()
-                    .interpolate(at.triangle, at.u, at.v, time)?
+                let surface = moving.surface();
+                surface.interpolate(at.triangle, at.u, at.v, time)?
             }
         };
         if at.is_turned {
@@ -232,23 +221,68 @@ impl From<Interpolated> for prismarch_point {
     }
 }
 
+/// How many time steps there are; those after the first have descriptions.
+fn time_steps(desc: &prismarch_surface_desc) -> Result<usize, Failure> {
+    let count = desc.time_step_count as usize;
+    if !(1..=MovingSurface::MAX_TIME_STEPS).contains(&count) {
+        return Err(Failure::argument(format!(
+            "time_step_count is {count}; expected 1 to {}",
+            MovingSurface::MAX_TIME_STEPS
+        )));
+    }
+    if count > 1 && desc.later_steps.is_null() {
+        return Err(Failure::null("later_steps"));
+    }
+    Ok(count)
+}
+
+/// # Safety
+///
+/// The indices of `desc` are readable.
+unsafe fn read_primitives(desc: &prismarch_surface_desc) -> Result<Primitives, Failure> {
+    let count = desc.primitive_count;
+    if count > Primitives::MOST {
+        return Err(Failure::argument(format!(
+            "primitive_count is {count}; expected at most {}",
+            Primitives::MOST
+        )));
+    }
+    let (count, null) = (count as usize, || Failure::null("indices.data"));
+    // SAFETY: the caller's promise.
+    unsafe {
+        match desc.primitive {
+            c::prismarch_primitive_PRISMARCH_TRIANGLES => Ok(Primitives::Triangles(
+                Array::new(&desc.indices, count, "indices")?
+                    .ok_or_else(null)?
+                    .read()?,
+            )),
+            c::prismarch_primitive_PRISMARCH_QUADS => Ok(Primitives::Quads(
+                Array::new(&desc.indices, count, "indices")?
+                    .ok_or_else(null)?
+                    .read()?,
+            )),
+            other => Err(Failure::argument(format!(
+                "primitive is {other}; expected a prismarch_primitive"
+            ))),
+        }
+    }
+}
+
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn prismarch_surface_desc_init(
     desc: *mut prismarch_surface_desc,
 ) -> prismarch_status {
-    // SAFETY: pointers as the header asks; all its fields may be zero.
-    unsafe {
-        answer(std::ptr::null_mut(), || {
-            if desc.is_null() {
-                return Err(Failure::null("desc"));
-            }
-            desc.write_bytes(0, 1);
-            let desc = &mut *desc;
-            desc.struct_size = size_of::<prismarch_surface_desc>();
-            (desc.scale, desc.step, desc.time_step_count) = (1.0, 1.0, 1);
-            Ok(())
-        })
-    }
+    // SAFETY: pointers as the header asks; so large it has been in all versions.
+    unsafe { prismarch_surface_desc_init_sized(desc, desc::FIRST_SIZE) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn prismarch_surface_desc_init_sized(
+    desc: *mut prismarch_surface_desc,
+    size: usize,
+) -> prismarch_status {
+    // SAFETY: pointers as the header asks.
+    unsafe { answer(std::ptr::null_mut(), || desc::init(desc, size)) }
 }
 
 #[unsafe(no_mangle)]
@@ -261,17 +295,8 @@ pub unsafe extern "C" fn prismarch_surface_create(
     unsafe {
         answer(error, || {
             let out = output(surface, "surface")?;
-            if desc.is_null() {
-                return Err(Failure::null("desc"));
-            }
-            let (found, expected) = ((*desc).struct_size, size_of::<prismarch_surface_desc>());
-            if found != expected {
-                return Err(Failure::argument(format!(
-                    "desc->struct_size is {found}; expected {expected}: call prismarch_surface_desc_init first"
-                )));
-            }
-            let made = Handle::new(Surface::new(&*desc)?);
-            *out = made.give().cast_mut().cast();
+            let desc = desc::read(desc)?;
+            *out = give(Arc::new(Surface::new(&desc)?))?;
             Ok(())
         })
     }
@@ -288,11 +313,11 @@ pub unsafe extern "C" fn prismarch_surface_update_vertices(
     // SAFETY: pointers as the header asks.
     unsafe {
         answer(error, || {
-            let surface = Handle::<Surface>::borrow(surface.cast())?;
-            let vertices = vertices.as_ref().ok_or_else(|| Failure::null("vertices"))?;
-            surface.update(time_step as usize, vertices)?;
-            if let Some(out) = commit_needed.as_mut() {
-                *out = true;
+            let surface = kept::<Surface, _>(surface)?;
+            let vertices = input(vertices, "vertices")?;
+            surface.update(time_step as usize, &vertices)?;
+            if !commit_needed.is_null() {
+                commit_needed.write(true);
             }
             Ok(())
         })
@@ -307,8 +332,8 @@ pub unsafe extern "C" fn prismarch_surface_check(
     // SAFETY: pointers as the header asks.
     unsafe {
         answer(error, || {
-            let surface = Handle::<Surface>::borrow(surface.cast())?;
-            Ok(surface.faults.take()?)
+            let surface = used::<Surface, _>(surface)?;
+            Ok(surface.options.faults.take()?)
         })
     }
 }
@@ -322,8 +347,9 @@ pub unsafe extern "C" fn prismarch_surface_bytes(
     // SAFETY: pointers as the header asks.
     unsafe {
         answer(error, || {
-            let surface = Handle::<Surface>::borrow(surface.cast())?;
-            let prisms = surface.live.now().prisms();
+            let surface = used::<Surface, _>(surface)?;
+            let within = surface.live.enter();
+            let prisms = within.now().prisms();
             *output(bytes, "bytes")? = prisms.bytes() + prisms.surface().mesh().bytes();
             Ok(())
         })
@@ -334,16 +360,14 @@ pub unsafe extern "C" fn prismarch_surface_bytes(
 pub unsafe extern "C" fn prismarch_surface_retain(
     surface: *mut c::prismarch_surface,
 ) -> prismarch_status {
-    // SAFETY: pointers as the header asks.
-    unsafe { Handle::<Surface>::retain(surface.cast()) }
+    retain::<Surface, _>(surface)
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn prismarch_surface_release(
     surface: *mut c::prismarch_surface,
 ) -> prismarch_status {
-    // SAFETY: pointers as the header asks.
-    unsafe { Handle::<Surface>::release(surface.cast()) }
+    release::<Surface, _>(surface)
 }
 
 #[unsafe(no_mangle)]
@@ -359,7 +383,7 @@ pub unsafe extern "C" fn prismarch_interpolate(
     // SAFETY: pointers as the header asks.
     unsafe {
         answer(error, || {
-            let surface = Handle::<Surface>::borrow(surface.cast())?;
+            let surface = used::<Surface, _>(surface)?;
             *output(point, "point")? = surface.interpolate(prim_id, u, v, time)?.into();
             Ok(())
         })
@@ -381,7 +405,7 @@ pub unsafe extern "C" fn prismarch_interpolate_n(
     // SAFETY: pointers as the header asks: all arrays have n entries.
     unsafe {
         answer(error, || {
-            let surface = Handle::<Surface>::borrow(surface.cast())?;
+            let surface = kept::<Surface, _>(surface)?;
             let arrays = [
                 (prim_ids.is_null(), "prim_ids"),
                 (u.is_null(), "u"),
@@ -392,16 +416,18 @@ pub unsafe extern "C" fn prismarch_interpolate_n(
                 return Err(Failure::null(what));
             }
             for i in 0..n as usize {
-                if !valid.is_null() && *valid.add(i) != -1 {
+                if !valid.is_null() && valid.add(i).read_unaligned() != -1 {
                     continue;
                 }
+                let prim = prim_ids.add(i).read_unaligned();
+                let (u, v) = (u.add(i).read_unaligned(), v.add(i).read_unaligned());
                 let found = surface
-                    .interpolate(*prim_ids.add(i), *u.add(i), *v.add(i), time)
+                    .interpolate(prim, u, v, time)
                     .map_err(|failure| Failure {
                         message: format!("entry {i}: {}", failure.message),
                         ..failure
                     })?;
-                points.add(i).write(found.into());
+                points.add(i).write_unaligned(found.into());
             }
             Ok(())
         })

@@ -16,9 +16,12 @@
 //! # }
 //! ```
 
+use std::collections::BTreeMap;
 use std::ffi::c_void;
+use std::mem::ManuallyDrop;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::NonNull;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use glam::Vec3;
 
@@ -31,6 +34,27 @@ use crate::surface::ClosestPoint;
 pub struct RawGeometry {
     handle: NonNull<c_void>,
     faults: Arc<Faults>,
+    /// Never dropped here: nobody knows when Embree lets go of the geometry.
+    unwatched: ManuallyDrop<Option<Unwatched>>,
+}
+
+/// How a geometry is made.
+#[derive(Clone, Debug)]
+pub struct RawOptions {
+    /// Where faults are kept, also those of other geometries.
+    pub faults: Arc<Faults>,
+    /// Whether filters may be set for the geometry, which cannot be seen from a hit test. Where none will be, packets are met
+    /// side by side and occlusion rays end at any hit; one that is set all the same may not be asked.
+    pub has_filter: bool,
+}
+
+impl Default for RawOptions {
+    fn default() -> Self {
+        Self {
+            faults: Arc::default(),
+            has_filter: true,
+        }
+    }
 }
 
 // SAFETY: Embree counts references atomically, and may be called from any thread.
@@ -42,6 +66,50 @@ impl Drop for RawGeometry {
     fn drop(&mut self) {
         // SAFETY: the reference that `new` took.
         unsafe { sys::pm_foreign_release(self.handle.as_ptr()) }
+    }
+}
+
+/// Whether this build can notice that Embree destroys a geometry: with glibc alone. Elsewhere what geometries trace stays until the process ends.
+pub fn notices_ends() -> bool {
+    // SAFETY: reads a constant.
+    unsafe { sys::pm_foreign_can_watch() }
+}
+
+/// The geometries that are live, by address, and what belongs to them.
+static GEOMETRIES: RwLock<BTreeMap<usize, Record>> = RwLock::new(BTreeMap::new());
+
+#[derive(Clone, Copy, PartialEq)]
+struct Record(NonNull<sys::pm_foreign>);
+
+// SAFETY: the C functions on it may be called from any thread.
+unsafe impl Send for Record {}
+// SAFETY: as above.
+unsafe impl Sync for Record {}
+
+fn geometries() -> RwLockReadGuard<'static, BTreeMap<usize, Record>> {
+    GEOMETRIES.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn geometries_mut() -> RwLockWriteGuard<'static, BTreeMap<usize, Record>> {
+    GEOMETRIES.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What a geometry traces, where nobody notices its end. Dropped when nothing traces or commits the geometry any more.
+pub(crate) struct Unwatched {
+    address: usize,
+    record: Record,
+}
+
+impl Drop for Unwatched {
+    fn drop(&mut self) {
+        let mut live = geometries_mut();
+        // Another geometry may have got the address.
+        if live.get(&self.address) == Some(&self.record) {
+            live.remove(&self.address);
+        }
+        drop(live);
+        // SAFETY: made by `pm_foreign_new`, not watched, freed once; nothing uses it by the promise of whoever drops this.
+        unsafe { sys::pm_foreign_free(self.record.0.as_ptr()) }
     }
 }
 
@@ -60,10 +128,10 @@ impl RawGeometry {
         test: Arc<T>,
     ) -> Result<Self, EmbreeError> {
         // SAFETY: the caller's promise.
-        unsafe { Self::with_faults(device, test, Arc::default()) }
+        unsafe { Self::with_options(device, test, RawOptions::default()) }
     }
 
-    /// [`Self::new`] with faults that other geometries have, too.
+    /// [`Self::new`] with options.
     ///
     /// # Errors
     ///
@@ -72,10 +140,10 @@ impl RawGeometry {
     /// # Safety
     ///
     /// As there.
-    pub unsafe fn with_faults<T: HitTest + 'static>(
+    pub unsafe fn with_options<T: HitTest + 'static>(
         device: NonNull<c_void>,
         test: Arc<T>,
-        faults: Arc<Faults>,
+        options: RawOptions,
     ) -> Result<Self, EmbreeError> {
         // SAFETY: the caller's promise.
         let found = unsafe { sys::pm_foreign_major(device.as_ptr()) };
@@ -83,6 +151,7 @@ impl RawGeometry {
         if found != expected {
             return Err(EmbreeError::WrongVersion { found, expected });
         }
+        let RawOptions { faults, has_filter } = options;
         let stored = Stored::new(faults.clone(), test)?;
         let (primitives, time_steps) = (stored.primitives, stored.time_steps);
         let user = Arc::into_raw(stored);
@@ -94,10 +163,12 @@ impl RawGeometry {
                 user.cast_mut().cast(),
                 primitives,
                 time_steps,
+                has_filter,
+                Some(ending),
                 Some(gone::<T>),
             )
         };
-        let Some(handle) = NonNull::new(made) else {
+        let Some(record) = NonNull::new(made) else {
             // SAFETY: no geometry was made: the count is still ours.
             drop(unsafe { Arc::from_raw(user) });
             return Err(EmbreeError::Library {
@@ -105,7 +176,21 @@ impl RawGeometry {
                 message: "no geometry was made; the device's error function knows why".to_string(),
             });
         };
-        Ok(Self { handle, faults })
+        // SAFETY: a live record, whose geometry nobody else has yet.
+        let (handle, is_watched) = unsafe {
+            (
+                NonNull::new_unchecked(sys::pm_foreign_geometry(made)),
+                sys::pm_foreign_is_watched(made),
+            )
+        };
+        let (address, record) = (handle.addr().get(), Record(record));
+        geometries_mut().insert(address, record);
+        let unwatched = (!is_watched).then(|| Unwatched { address, record });
+        Ok(Self {
+            handle,
+            faults,
+            unwatched: ManuallyDrop::new(unwatched),
+        })
     }
 
     /// The `RTCGeometry`, valid while this or another reference lives.
@@ -115,12 +200,21 @@ impl RawGeometry {
 
     /// The `RTCGeometry` with its reference: the caller releases it.
     pub fn into_raw(self) -> NonNull<c_void> {
-        let handle = self.handle;
-        // The reference goes to the caller, the count of the faults does not.
-        let this = std::mem::ManuallyDrop::new(self);
-        // SAFETY: `this` is never used or dropped again.
-        drop(unsafe { std::ptr::read(&raw const this.faults) });
+        let (handle, unwatched) = self.into_parts();
+        std::mem::forget(unwatched);
         handle
+    }
+
+    /// [`Self::into_raw`], and what must be kept as long as Embree may call the geometry, where its end is not noticed.
+    pub(crate) fn into_parts(self) -> (NonNull<c_void>, Option<Unwatched>) {
+        // The reference goes to the caller, the count of the faults does not.
+        let mut this = ManuallyDrop::new(self);
+        // SAFETY: `this` is never used or dropped again.
+        let unwatched = unsafe {
+            std::ptr::drop_in_place(&raw mut this.faults);
+            ManuallyDrop::take(&mut this.unwatched)
+        };
+        (this.handle, unwatched)
     }
 
     /// What went wrong in hit tests.
@@ -139,10 +233,19 @@ impl RawGeometry {
     }
 }
 
+/// Embree is about to destroy the geometry: from now on the address says nothing.
+unsafe extern "C" fn ending(geometry: *const c_void) {
+    geometries_mut().remove(&geometry.addr());
+}
+
 /// Embree has destroyed the geometry.
 unsafe extern "C" fn gone<T: HitTest>(user: *mut c_void) {
     // SAFETY: the count that `RawGeometry::new` gave to the geometry.
-    drop(unsafe { Arc::from_raw(user.cast_const().cast::<Stored<T>>()) });
+    let stored = unsafe { Arc::from_raw(user.cast_const().cast::<Stored<T>>()) };
+    // No panic may cross the frames of Embree's that are below.
+    if let Err(payload) = catch_unwind(AssertUnwindSafe(|| drop(stored))) {
+        std::mem::forget(payload);
+    }
 }
 
 /// Version of the Embree headers that this was built with: major * 10000 + minor * 100 + patch.
@@ -151,24 +254,36 @@ pub fn version() -> u32 {
     unsafe { sys::pm_version_of_headers() }
 }
 
-/// A pointer of the caller's own, which filters of the geometry are given as its user data.
-///
-/// # Safety
-///
-/// `geometry` is a live `RTCGeometry` that a [`RawGeometry`] has made.
-pub unsafe fn set_caller_data(geometry: NonNull<c_void>, data: *mut c_void) {
-    // SAFETY: the caller's promise.
-    unsafe { sys::pm_foreign_set_caller_data(geometry.as_ptr(), data) }
+/// A pointer of the caller's own, which filters of the geometry are given as its user data. False where the address is not that of a live
+/// geometry that a [`RawGeometry`] has made; it is looked up, and nothing is read through it. (Where [ends are not noticed](notices_ends) the
+/// address of a destroyed geometry is taken for a live one.)
+#[allow(clippy::not_unsafe_ptr_arg_deref)] // `data` is kept, and never read through
+pub fn set_caller_data(geometry: NonNull<c_void>, data: *mut c_void) -> bool {
+    let live = geometries();
+    let record = live.get(&geometry.addr().get());
+    if let Some(record) = record {
+        // SAFETY: records are freed after they have left the table, which is locked.
+        unsafe { sys::pm_foreign_set_caller_data(record.0.as_ptr(), data) }
+    }
+    record.is_some()
 }
 
-/// What [`set_caller_data`] has set; null before.
+/// What [`set_caller_data`] has set, null before; `None` where that would be false.
+pub fn caller_data(geometry: NonNull<c_void>) -> Option<*mut c_void> {
+    let live = geometries();
+    let record = live.get(&geometry.addr().get())?;
+    // SAFETY: as in `set_caller_data`.
+    Some(unsafe { sys::pm_foreign_caller_data(record.0.as_ptr()) })
+}
+
+/// Whether a scene is committed, and nothing was attached, detached or set since. Where it is not, the device's error function is told, too.
 ///
 /// # Safety
 ///
-/// As there.
-pub unsafe fn caller_data(geometry: NonNull<c_void>) -> *mut c_void {
+/// `scene` is a live `RTCScene` that is not changed meanwhile.
+pub unsafe fn is_committed(scene: NonNull<c_void>) -> bool {
     // SAFETY: the caller's promise.
-    unsafe { sys::pm_foreign_caller_data(geometry.as_ptr()) }
+    unsafe { sys::pm_foreign_is_committed(scene.as_ptr()) }
 }
 
 /// The nearest point of the geometries of this library in a scene, no further than `radius`, and its geomID. Instances in the scene are
