@@ -115,7 +115,7 @@ pub unsafe extern "C" fn prismarch_map_load(
                 let Ok(channel) = text(channel, "channel")?.parse();
                 channel
             };
-            let made = load_heights(Path::new(path), &channel, wrap_of(wrap)?)?;
+            let made = load_heights(Path::new(path), &channel, wrap_of(wrap)?, None)?;
             *out = Map::create(made).cast_mut().cast();
             Ok(())
         })
