@@ -50,6 +50,26 @@ macro_rules! each_type {
 }
 pub(super) use each_type;
 
+/// Samples of the same type by `$body` for the samples `$s` of whatever type `$samples` holds.
+macro_rules! map_each {
+    ($samples:expr, $s:ident => $body:expr) => {
+        match $samples {
+            Samples::U8($s) => Samples::U8($body),
+            Samples::U16($s) => Samples::U16($body),
+            Samples::U32($s) => Samples::U32($body),
+            Samples::U64($s) => Samples::U64($body),
+            Samples::I8($s) => Samples::I8($body),
+            Samples::I16($s) => Samples::I16($body),
+            Samples::I32($s) => Samples::I32($body),
+            Samples::I64($s) => Samples::I64($body),
+            Samples::F16($s) => Samples::F16($body),
+            Samples::F32($s) => Samples::F32($body),
+            Samples::F64($s) => Samples::F64($body),
+        }
+    };
+}
+pub(super) use map_each;
+
 impl Samples {
     /// Whether they are fractions of their largest value, as codes of colours are.
     pub fn are_fractions(&self) -> bool {

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::channels;
 use super::codec::Codec;
 use super::directory::{Directory, Source};
+use super::orientation::Orientation;
 use super::predictor::Predictor;
 use super::{Fault, palette};
 use crate::image::MAX_PIXELS;
@@ -57,6 +58,8 @@ pub(super) struct Layout {
     pub predictor: Predictor,
     /// The first bit of a byte is its lowest.
     pub reversed_bits: bool,
+    /// How rows lie in the picture; width and height are those of rows.
+    pub orientation: Orientation,
     /// What the file declares to mean "no data" (GDAL).
     pub nodata: Option<String>,
 }
@@ -69,6 +72,7 @@ mod tag {
     pub const PHOTOMETRIC: u16 = 262;
     pub const FILL_ORDER: u16 = 266;
     pub const STRIP_OFFSETS: u16 = 273;
+    pub const ORIENTATION: u16 = 274;
     pub const SAMPLES_PER_PIXEL: u16 = 277;
     pub const ROWS_PER_STRIP: u16 = 278;
     pub const STRIP_BYTE_COUNTS: u16 = 279;
@@ -132,6 +136,9 @@ const SAMPLES: &str =
     "integers of 1 to 32 or of 64 bits, or floats of 16, 24, 32 or 64, are expected";
 const COLORS: &str = "grey, RGB, a palette or bands of heights are expected";
 
+/// Most bytes of the tables that JPEG strips or tiles share: far more than four of each kind take.
+const JPEG_TABLES: u64 = 1 << 16;
+
 impl Layout {
     pub fn read<R: BufRead + Seek>(
         path: &Path,
@@ -148,7 +155,7 @@ impl Layout {
             return Err(Fault::Unsupported(found, "fewer are expected"));
         }
         let codec = tags.number(tag::COMPRESSION)?.unwrap_or(1);
-        let codec = Codec::of(codec, || tags.bytes(tag::JPEG_TABLES, u64::MAX))?;
+        let codec = Codec::of(codec, || tags.bytes(tag::JPEG_TABLES, JPEG_TABLES))?;
         let (kind, bits) = kind(&mut tags, samples)?;
         let photometric = photometric(&mut tags, samples, &codec, (kind, bits))?;
         let extra = tags
@@ -166,6 +173,7 @@ impl Layout {
             predictor: Predictor::of(predictor, &codec, kind, bits)?,
             codec,
             reversed_bits: tags.number(tag::FILL_ORDER)? == Some(2),
+            orientation: Orientation::of(tags.number(tag::ORIENTATION)?.unwrap_or(1)),
             nodata: nodata(&mut tags)?,
             chunk_width: 0,
             chunk_height: 0,

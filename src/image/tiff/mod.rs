@@ -10,6 +10,7 @@ mod codec;
 mod directory;
 mod jpeg;
 mod layout;
+mod orientation;
 mod palette;
 mod pixels;
 mod predictor;
@@ -17,8 +18,8 @@ mod predictor;
 use std::io::{self, BufRead, Seek};
 use std::path::Path;
 
-use super::raster::Raster;
-use super::samples::{NoData, Number};
+use super::raster::{Raster, channel_names};
+use super::samples::{NoData, Number, Samples, map_each};
 use super::{Format, ImageError};
 use directory::Source;
 use layout::{Layout, Photometric};
@@ -44,13 +45,15 @@ fn read(path: &Path, reader: impl BufRead + Seek) -> Result<Raster, Fault> {
     let (mut source, first) = Source::open(reader)?;
     let page = directory::page(&mut source, first)?;
     let layout = Layout::read(path, &page, &mut source)?;
+    let rows = (layout.width, layout.height);
     let samples = pixels::read(&mut source, &layout)?;
-    let (width, height) = (layout.width, layout.height);
+    let samples = map_each!(samples, s => layout.orientation.apply(s, rows)?);
+    let (width, height) = layout.orientation.size(rows);
     if let Photometric::Palette(colors) = &layout.photometric {
         return Ok(Raster {
             width,
             height,
-            channels: super::raster::channel_names(3),
+            channels: channel_names(3),
             samples: palette::apply(colors, samples)?,
             // It would be an index, and no height.
             nodata: None,

@@ -215,6 +215,18 @@ fn a_palette_gives_colours() {
 }
 
 #[test]
+fn rows_lie_where_the_orientation_says() {
+    let picture = Tiff::rgb(2, 1, &[1u8, 2, 3, 4, 5, 6]);
+    let code = |code: u8| code.height();
+    let turned = raster(&picture.clone().with(274, 3, [6]).bytes()).unwrap();
+    assert_eq!((turned.width, turned.height), (1, 2));
+    assert_eq!(
+        heights(&picture.with(274, 3, [2])),
+        [4, 5, 6, 1, 2, 3].map(code)
+    );
+}
+
+#[test]
 fn what_is_left_out_has_the_meaning_that_everyone_gives_it() {
     let picture = Tiff::grey(2, 2, &[1u8, 2, 3, 4]);
     let expected = [1u8, 2, 3, 4].map(|code| code.height());
