@@ -157,6 +157,13 @@ impl Layout {
         let codec = tags.number(tag::COMPRESSION)?.unwrap_or(1);
         let codec = Codec::of(codec, || tags.bytes(tag::JPEG_TABLES, JPEG_TABLES))?;
         let (kind, bits) = kind(&mut tags, samples)?;
+        if matches!(codec, Codec::Jpeg { .. }) && (kind, bits) != (Kind::Unsigned, 8) {
+            let found = format!("{bits}-bit samples in JPEG compression");
+            return Err(Fault::Unsupported(
+                found,
+                "8-bit unsigned ones are expected",
+            ));
+        }
         let photometric = photometric(&mut tags, samples, &codec, (kind, bits))?;
         let extra = tags
             .numbers(tag::EXTRA_SAMPLES, samples)?

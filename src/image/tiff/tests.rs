@@ -188,11 +188,69 @@ fn predictors_are_undone_row_by_row() {
     assert!(error.contains("predictor 2 on 1-bit"), "{error}");
 }
 
+/// A JPEG picture, 16x8 pixels of one colour.
+fn jpeg(color: image::ExtendedColorType, pixel: &[u8]) -> Vec<u8> {
+    let mut file = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut file, 100)
+        .encode(&pixel.repeat(16 * 8), 16, 8, color)
+        .unwrap();
+    file
+}
+
+/// Its quantisation and Huffman tables as a picture without pixels, and the picture without them.
+fn without_tables(jpeg: &[u8]) -> (Vec<u8>, Vec<u8>) {
+    let (mut tables, mut picture) = (jpeg[..2].to_vec(), jpeg[..2].to_vec());
+    let mut rest = &jpeg[2..];
+    while rest[1] != 0xda {
+        let length = 2 + usize::from(u16::from_be_bytes([rest[2], rest[3]]));
+        match rest[1] {
+            0xdb | 0xc4 => tables.extend(&rest[..length]),
+            _ => picture.extend(&rest[..length]),
+        }
+        rest = &rest[length..];
+    }
+    picture.extend(rest);
+    tables.extend([0xff, 0xd9]);
+    (tables, picture)
+}
+
+#[test]
+fn jpeg_in_strips_and_tiles_with_tables_in_common() {
+    let near = |picture: &Tiff, pixel: &[u8]| {
+        let heights = heights(picture);
+        assert_eq!(heights.len() % pixel.len(), 0);
+        let expected = pixel.iter().map(|code| code.height()).cycle();
+        let worst = heights.iter().zip(expected).map(|(a, b)| (a - b).abs());
+        assert!(worst.fold(0.0, f32::max) < 3.0 / 255.0);
+    };
+    let (tables, strip) = without_tables(&jpeg(image::ExtendedColorType::L8, &[100]));
+    let tables = tables.into_iter().map(u64::from);
+    let strips = Tiff::packed(16, 13, 8, Vec::new()).with(259, 3, [7]);
+    let strips = strips
+        .strips(8, vec![strip.clone(); 2])
+        .with(347, 7, tables);
+    near(&strips, &[100]);
+    let short = strip[..strip.len() - 2].to_vec();
+    let error = refused(&strips.clone().strips(8, vec![strip, short]));
+    assert!(
+        error.contains("strip 1") && error.contains("end"),
+        "{error}"
+    );
+    let error = refused(&strips.with(256, 4, [20_000]));
+    assert!(error.contains("20000x8"), "{error}");
+    // YCbCr in the file, and RGB for whoever reads it.
+    let tile = jpeg(image::ExtendedColorType::Rgb8, &[200, 100, 50]);
+    let colors = Tiff::rgb::<u8>(21, 7, &[])
+        .with(262, 3, [6])
+        .with(259, 3, [7]);
+    near(&colors.tiles(16, 8, vec![tile; 2]), &[200, 100, 50]);
+}
+
 #[test]
 fn a_palette_gives_colours() {
     let reds = [0, 0x1234, 0xffff, 0];
     let map = [reds, [7, 8, 9, 10], [0; 4]].concat();
-    let picture = Tiff::packed(2, 1, 2, vec![0b01_10_0000]).with(262, 3, [3]);
+    let picture = Tiff::packed(2, 1, 2, vec![0b0110_0000]).with(262, 3, [3]);
     let picture = picture.with(320, 3, map);
     let raster = raster(&picture.bytes()).unwrap();
     assert_eq!(raster.channels, ["R", "G", "B"]);
@@ -277,6 +335,10 @@ fn what_is_not_read_is_refused_by_name() {
         (grey.clone().with(262, 3, [6]), "YCbCr"),
         (grey.clone().with(339, 3, [5]), "complex"),
         (grey.clone().with(258, 3, [40]), "40-bit"),
+        (
+            grey.clone().with(259, 3, [7]).with(258, 3, [1]),
+            "1-bit samples in JPEG",
+        ),
         (grey.clone().with(339, 3, [3]), "8-bit floats"),
         (
             Tiff::rgb(1, 1, &[1u8, 2, 3]).with(258, 3, [5, 6, 5]),
