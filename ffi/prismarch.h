@@ -116,7 +116,7 @@ typedef struct prismarch_texels {
 prismarch_status prismarch_map_create(uint32_t width, uint32_t height, const prismarch_texels *texels, prismarch_wrap wrap,
                                       prismarch_map **map, prismarch_error *error);
 /* The same from a PNG, JPEG, TIFF, EXR or HDR file in its own precision (its bottom row is row 0). `channel`: NULL for luminance, or
- * R, G, B, A or the name of an EXR channel. */
+ * R, G, B, A, the name of an EXR channel or the number of a band, from 1. Texels without data are an error. */
 prismarch_status prismarch_map_load(const char *path, const char *channel, prismarch_wrap wrap, prismarch_map **map,
                                     prismarch_error *error);
 prismarch_status prismarch_map_size(const prismarch_map *map, uint32_t *width, uint32_t *height, prismarch_error *error);

@@ -169,6 +169,66 @@ ox,oy,oz,dx,dy,dz,tnear,tfar
     }
 }
 
+/// A TIFF of signed 16-bit heights, 2x1, that declares -9999 to mean no data.
+fn elevations(heights: [i16; 2]) -> Vec<u8> {
+    let text = b"-9999\0";
+    let entries: [(u16, u16, u32, u32); 9] = [
+        (256, 3, 1, 2),
+        (257, 3, 1, 1),
+        (258, 3, 1, 16),
+        (262, 3, 1, 1),
+        (273, 4, 1, 8),
+        (277, 3, 1, 1),
+        (279, 4, 1, 4),
+        (339, 3, 1, 2),
+        (42113, 2, text.len() as u32, 12),
+    ];
+    let mut file = b"II*\0\x12\0\0\0".to_vec();
+    file.extend(heights.map(i16::to_le_bytes).concat());
+    file.extend(text);
+    file.extend((entries.len() as u16).to_le_bytes());
+    for (tag, kind, count, value) in entries {
+        file.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
+        file.extend([count.to_le_bytes(), value.to_le_bytes()].concat());
+    }
+    file.extend([0; 4]);
+    file
+}
+
+#[test]
+fn elevations_are_metres_and_gaps_in_them_are_filled_or_named() {
+    let folder = Folder::with_quad();
+    folder.put("dem.tif", elevations([1200, -9999]));
+    let scene = SCENE.replace("flat.png", "dem.tif").replace("0.2", "0.001");
+    folder.put("gaps.toml", &scene);
+    folder.put("filled.toml", format!("{scene}nodata = -300\n"));
+    folder.put(
+        "rays.csv",
+        "ox,oy,oz,dx,dy,dz\n-0.5,0,5,0,0,-1\n0.5,0,5,0,0,-1\n",
+    );
+    let surface = [
+        "query", "--mesh", "quad.obj", "--map", "dem.tif", "--scale", "0.001",
+    ];
+    let table = ["--rays", "rays.csv"];
+    let fill = ["--nodata", "-300"];
+    for gaps in [&surface[..], &["query", "gaps.toml"]] {
+        let output = folder.run(&[gaps, &table].concat());
+        assert_eq!(output.status.code(), Some(3));
+        let message = stderr(&output);
+        let words = ["dem.tif", "texel (1, 0)", "-9999", "nodata"];
+        assert!(words.iter().all(|word| message.contains(word)), "{message}");
+    }
+    for filled in [
+        &[&surface[..], &fill].concat(),
+        &["query", "filled.toml"][..],
+    ] {
+        let output = folder.run(&[filled, &table].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let hits = rows(&String::from_utf8(output.stdout).unwrap());
+        assert!(near(&[hits[0][8], hits[1][8]], &[1.2, -0.3]), "{hits:?}");
+    }
+}
+
 #[test]
 fn instances_are_hit_in_world_space() {
     let folder = Folder::with_quad();

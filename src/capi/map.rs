@@ -131,7 +131,12 @@ pub unsafe extern "C" fn prismarch_map_load(
                 let Ok(channel) = text(channel, "channel")?.parse();
                 channel
             };
-            *out = Map::create(load_heights(Path::new(path), &channel, wrap_of(wrap)?)?)?;
+            *out = Map::create(load_heights(
+                Path::new(path),
+                &channel,
+                wrap_of(wrap)?,
+                None,
+            )?)?;
             Ok(())
         })
     }

@@ -75,12 +75,15 @@ struct SurfaceArgs {
     /// Height that stays on the mesh
     #[arg(long, value_name = "X", value_parser = parse::finite, allow_hyphen_values = true, default_value_t = 0.0, requires = "mesh")]
     midlevel: f32,
-    /// Channel of the map: luminance, r, g, b, a or the name of an EXR channel
+    /// Channel of the map: luminance, r, g, b, a, the name of an EXR channel or the number of a band, from 1
     #[arg(long, value_name = "C", default_value = "luminance", requires = "mesh")]
     channel: String,
     /// The map outside of [0, 1]
     #[arg(long, value_enum, default_value_t = WrapKind::Repeat, requires = "mesh")]
     wrap: WrapKind,
+    /// Height of texels without one: those with the value that the map declares to mean no data, NaN, infinite ones
+    #[arg(long, value_name = "H", value_parser = parse::finite, allow_hyphen_values = true, requires = "mesh")]
+    nodata: Option<f32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -206,6 +209,7 @@ impl Args {
                     map: map.clone(),
                     channel,
                     wrap: self.surface.wrap.into(),
+                    nodata: self.surface.nodata,
                     displacement: Displacement {
                         scale,
                         midlevel: self.surface.midlevel,

@@ -21,7 +21,7 @@ pub enum Channel {
     B,
     /// Alpha.
     A,
-    /// A channel by its name in the file; `layer.channel` where there are layers.
+    /// A channel by its name in the file; `layer.channel` where there are layers, the number from 1 but in EXR.
     Named(String),
 }
 
@@ -77,6 +77,21 @@ pub(super) fn select(
             None => Err(missing(channel, names, path)),
         },
     }
+}
+
+/// As [`select`] for interleaved channels, which a number names too: the first is 1, as GDAL counts bands.
+pub(super) fn select_band(
+    channel: &Channel,
+    names: &[String],
+    path: &Path,
+) -> Result<Vec<usize>, ImageError> {
+    if let Channel::Named(name) = channel
+        && let Ok(number @ 1..) = name.parse::<usize>()
+        && number <= names.len()
+    {
+        return Ok(vec![number - 1]);
+    }
+    select(channel, names, path)
 }
 
 fn color(names: &[String], path: &Path) -> Result<Vec<usize>, ImageError> {
@@ -156,6 +171,24 @@ mod tests {
         assert_eq!(pick("g", &["Y", "A"]).unwrap(), [0]);
         assert_eq!(pick("disp.Z", &["base.Z", "disp.Z"]).unwrap(), [1]);
         assert_eq!(pick("height", &["base.R", "disp.height"]).unwrap(), [1]);
+    }
+
+    #[test]
+    fn bands_are_found_by_their_number_too() {
+        let names = ["R", "G", "B", "4"].map(str::to_owned);
+        let pick = |channel: &str| {
+            let Ok(channel) = channel.parse();
+            select_band(&channel, &names, Path::new("map.tif"))
+        };
+        assert_eq!(pick("1").unwrap(), [0]);
+        assert_eq!(pick("4").unwrap(), [3]);
+        assert_eq!(pick("g").unwrap(), [1]);
+        for missing in ["0", "5", "-1"] {
+            assert!(matches!(
+                pick(missing),
+                Err(ImageError::NoSuchChannel { .. })
+            ));
+        }
     }
 
     #[test]

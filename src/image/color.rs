@@ -7,7 +7,8 @@ use glam::{Vec2, Vec3};
 
 use super::channel::{self, Channel};
 use super::exr_file::ExrFile;
-use super::raster::{self, Raster, Samples};
+use super::raster::{self, Raster};
+use super::samples::{Sample as _, Samples, each_type};
 use super::srgb::{self, srgb_decode};
 use super::{Format, ImageError, fingerprint, format};
 use crate::surface::Wrap;
@@ -136,7 +137,10 @@ pub fn load_color(path: &Path, color_space: ColorSpace) -> Result<ColorImage, Im
                 .collect();
             rgb(&raster, s, |code| table[usize::from(code)])
         }
-        Samples::F32(s) => rgb(&raster, s, |value| value),
+        fractions if fractions.are_fractions() => {
+            each_type!(fractions, s => rgb(&raster, s, |code| decode(code.height())))
+        }
+        linear => each_type!(linear, s => rgb(&raster, s, |value| value.height())),
     };
     linear_image(path, width, height, pixels)
 }

@@ -61,7 +61,7 @@ pub enum ImageError {
         /// Pixels up.
         height: u64,
     },
-    /// Samples of a kind that cannot be kept: signed or 32-bit integers, palettes in TIFF, subsampled channels.
+    /// Samples, colours or compression of a kind that is not read.
     #[error("{path} holds {found}, which is not supported; {expected}")]
     UnsupportedSamples {
         /// The file.
@@ -112,6 +112,44 @@ pub enum ImageError {
         path: PathBuf,
         /// Why.
         source: MapError,
+    },
+    /// A texel without data, by what the file declares.
+    #[error(
+        "texel ({x}, {y}) of {path} (from the bottom left) is {value}, which the file declares to mean no data; \
+         nodata = HEIGHT in a scene, or --nodata HEIGHT, says what to put there"
+    )]
+    NoData {
+        /// The file.
+        path: PathBuf,
+        /// Column from the left.
+        x: usize,
+        /// Row from the bottom.
+        y: usize,
+        /// The value as the file declares it.
+        value: String,
+    },
+    /// A file that declares to mean "no data" what is no number.
+    #[error("{path} declares {value:?} to mean no data; a number is expected (tag 42113)")]
+    BadNoData {
+        /// The file.
+        path: PathBuf,
+        /// What it declares.
+        value: String,
+    },
+    /// A NaN, infinite or enormous height.
+    #[error(
+        "texel ({x}, {y}) of {path} (from the bottom left) is {value:e}; a height is a finite number below 1e18, and \
+         nodata = HEIGHT in a scene, or --nodata HEIGHT, says what to put there"
+    )]
+    NoHeight {
+        /// The file.
+        path: PathBuf,
+        /// Column from the left.
+        x: usize,
+        /// Row from the bottom.
+        y: usize,
+        /// What was found.
+        value: f32,
     },
     /// A NaN or infinite pixel.
     #[error("pixel ({x}, {y}) from the top left of {path} is {value}; pixels must be finite")]

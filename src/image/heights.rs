@@ -4,21 +4,27 @@ use std::path::Path;
 
 use super::channel::{self, Channel};
 use super::exr_file::ExrFile;
-use super::raster::{self, Raster, Samples};
+use super::raster::{self, Raster};
+use super::samples::{NoData, Number, Sample, Samples, each_type};
 use super::{Format, ImageError, format};
 use crate::surface::{DisplacementMap, Texels, Wrap};
 
 /// Reads one channel of a PNG, JPEG, TIFF, EXR or Radiance HDR picture as a displacement map.
 ///
-/// 8-bit pictures become [`Texels::U8`], 16-bit ones [`Texels::U16`], halves and floats [`Texels::F32`]. The picture's bottom
-/// row is the map's first. With [`Channel::Luminance`] the colour channels must agree: exactly for integers, to
-/// half precision (1/1024) for floats, since lossy EXR compression treats each channel for itself.
+/// 8-bit pictures become [`Texels::U8`], 16-bit ones [`Texels::U16`], all others [`Texels::F32`]: larger unsigned integers
+/// as fractions of their largest, signed integers and floats as they stand. The picture's bottom row is the map's first. With
+/// [`Channel::Luminance`] the colour channels must agree: exactly for integers, to half precision (1/1024) for floats,
+/// since lossy EXR compression treats each channel for itself.
+///
+/// A texel has no height if it is not finite or not below 1e18, or has the value that the file declares to mean "no
+/// data". It is an error, or it gets the height `nodata`, and the map is one of floats.
 pub fn load_heights(
     path: &Path,
     channel: &Channel,
     wrap: Wrap,
+    nodata: Option<f32>,
 ) -> Result<DisplacementMap, ImageError> {
-    let (width, height, texels) = read_texels(path, channel)?;
+    let (width, height, texels) = read_texels(path, channel, nodata)?;
     DisplacementMap::new(width, height, texels, wrap).map_err(|source| ImageError::Map {
         path: path.to_owned(),
         source,
@@ -26,7 +32,11 @@ pub fn load_heights(
 }
 
 /// Width, height and heights, bottom row first.
-fn read_texels(path: &Path, channel: &Channel) -> Result<(usize, usize, Texels), ImageError> {
+fn read_texels(
+    path: &Path,
+    channel: &Channel,
+    nodata: Option<f32>,
+) -> Result<(usize, usize, Texels), ImageError> {
     let (format, file) = format::open(path)?;
     if format == Format::Exr {
         let file = ExrFile::open(path, file)?;
@@ -38,11 +48,15 @@ fn read_texels(path: &Path, channel: &Channel) -> Result<(usize, usize, Texels),
             width: read.width,
             names,
         };
-        let heights = chosen.agreed(read.planes, floats_agree)?;
-        return Ok((read.width, read.height, Texels::F32(heights)));
+        let heights = chosen.agreed(read.planes)?;
+        return Ok((
+            read.width,
+            read.height,
+            chosen.filled(heights, None, nodata)?,
+        ));
     }
     let raster = raster::decode(path, format, file)?;
-    let indices = channel::select(channel, &raster.channels, path)?;
+    let indices = channel::select_band(channel, &raster.channels, path)?;
     let chosen = Chosen {
         path,
         width: raster.width,
@@ -51,11 +65,11 @@ fn read_texels(path: &Path, channel: &Channel) -> Result<(usize, usize, Texels),
             .map(|&i| raster.channels[i].clone())
             .collect(),
     };
-    let texels = match &raster.samples {
-        Samples::U8(s) => Texels::U8(chosen.agreed(planes(s, &raster, &indices), |a, b| a == b)?),
-        Samples::U16(s) => Texels::U16(chosen.agreed(planes(s, &raster, &indices), |a, b| a == b)?),
-        Samples::F32(s) => Texels::F32(chosen.agreed(planes(s, &raster, &indices), floats_agree)?),
-    };
+    let declared = raster.nodata.as_ref();
+    let texels = each_type!(&raster.samples, s => {
+        let plane = chosen.agreed(planes(s, &raster, &indices))?;
+        chosen.filled(plane, declared, nodata)?
+    });
     Ok((raster.width, raster.height, texels))
 }
 
@@ -64,11 +78,6 @@ fn planes<T: Copy>(samples: &[T], raster: &Raster, indices: &[usize]) -> Vec<Vec
         .iter()
         .map(|&i| raster::plane(samples, raster.width, raster.channels.len(), i))
         .collect()
-}
-
-/// Two values that are not numbers agree here: the map's own check names the texel.
-fn floats_agree(a: f32, b: f32) -> bool {
-    a == b || (a - b).abs() <= a.abs().max(b.abs()) / 1024.0 || !(a.is_finite() && b.is_finite())
 }
 
 /// The channels that were chosen, for messages.
@@ -80,14 +89,10 @@ struct Chosen<'a> {
 
 impl Chosen<'_> {
     /// The first plane, if all others agree with it.
-    fn agreed<T: Copy>(
-        &self,
-        mut planes: Vec<Vec<T>>,
-        agree: impl Fn(T, T) -> bool,
-    ) -> Result<Vec<T>, ImageError> {
+    fn agreed<T: Sample>(&self, mut planes: Vec<Vec<T>>) -> Result<Vec<T>, ImageError> {
         let first = planes.swap_remove(0);
         for plane in &planes {
-            let differs = first.iter().zip(plane).position(|(&a, &b)| !agree(a, b));
+            let differs = first.iter().zip(plane).position(|(&a, &b)| !a.agrees(b));
             if let Some(texel) = differs {
                 return Err(ImageError::ChannelsDisagree {
                     path: self.path.to_owned(),
@@ -99,7 +104,59 @@ impl Chosen<'_> {
         }
         Ok(first)
     }
+
+    /// A plane as texels; those without a height get that of `nodata`.
+    fn filled<T: Sample>(
+        &self,
+        plane: Vec<T>,
+        declared: Option<&NoData>,
+        nodata: Option<f32>,
+    ) -> Result<Texels, ImageError> {
+        let number = match declared {
+            Some(declared) => Some(self.number(declared)?),
+            None => None,
+        };
+        let has_data = |sample: T| !number.is_some_and(|number| sample.is(&number));
+        let has_height = |sample: T| has_data(sample) && sample.height().abs() < HEIGHT_LIMIT;
+        let Some(first) = plane.iter().position(|&sample| !has_height(sample)) else {
+            return Ok(T::texels(plane));
+        };
+        if let Some(nodata) = nodata {
+            let height = |sample: T| match has_height(sample) {
+                true => sample.height(),
+                false => nodata,
+            };
+            return Ok(Texels::F32(plane.into_iter().map(height).collect()));
+        }
+        let (x, y) = (first % self.width, first / self.width);
+        let path = self.path.to_owned();
+        Err(match declared {
+            Some(declared) if !has_data(plane[first]) => ImageError::NoData {
+                path,
+                x,
+                y,
+                value: declared.text.clone(),
+            },
+            _ => ImageError::NoHeight {
+                path,
+                x,
+                y,
+                value: plane[first].height(),
+            },
+        })
+    }
+
+    fn number(&self, declared: &NoData) -> Result<Number, ImageError> {
+        declared.number.ok_or_else(|| ImageError::BadNoData {
+            path: self.path.to_owned(),
+            value: declared.text.clone(),
+        })
+    }
 }
+
+/// No surface with a height from here on has bounds that a ray tracer takes: what fills the gaps of a float map with
+/// the lowest f32 without declaring it is told apart from heights.
+const HEIGHT_LIMIT: f32 = 1e18;
 
 #[cfg(test)]
 mod tests;

@@ -15,8 +15,9 @@ mod exr_picture;
 mod format;
 mod heights;
 mod raster;
+mod samples;
 mod srgb;
-mod tiff_file;
+mod tiff;
 mod write;
 
 pub use channel::Channel;
@@ -40,3 +41,5 @@ pub(crate) fn fingerprint(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod test_files;
+#[cfg(test)]
+mod test_tiff;

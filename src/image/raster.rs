@@ -7,18 +7,9 @@ use std::path::Path;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::error::check_size;
-use super::tiff_file;
+use super::samples::{NoData, Samples};
+use super::tiff;
 use super::{Format, ImageError, MAX_PIXELS};
-
-/// Samples in the precision of the file, row by row from the top, channel by channel within a pixel.
-pub(super) enum Samples {
-    /// 0..=255.
-    U8(Vec<u8>),
-    /// 0..=65535.
-    U16(Vec<u16>),
-    /// As stored.
-    F32(Vec<f32>),
-}
 
 /// A decoded picture.
 pub(super) struct Raster {
@@ -26,22 +17,12 @@ pub(super) struct Raster {
     pub width: usize,
     /// Pixels down, at least 1.
     pub height: usize,
-    /// Names of the interleaved channels: Y, YA, RGB or RGBA.
+    /// Names of the interleaved channels: Y, YA, RGB or RGBA; bands of TIFF beyond by their number, from 1.
     pub channels: Vec<String>,
     /// width * height * channels samples.
     pub samples: Samples,
-}
-
-impl Raster {
-    /// Whether there are as many samples as the size and the channels ask for.
-    pub fn is_complete(&self) -> bool {
-        let found = match &self.samples {
-            Samples::U8(s) => s.len(),
-            Samples::U16(s) => s.len(),
-            Samples::F32(s) => s.len(),
-        };
-        found == self.width * self.height * self.channels.len()
-    }
+    /// The value that the file declares to mean "no data".
+    pub nodata: Option<NoData>,
 }
 
 /// Channel names of a pixel with so many samples.
@@ -79,7 +60,7 @@ pub(super) fn decode(
         Format::Png => decode_with(path, format, ImageFormat::Png, file),
         Format::Hdr => decode_with(path, format, ImageFormat::Hdr, file),
         Format::Jpeg => decode_jpeg(path, file),
-        Format::Tiff => tiff_file::decode(path, file),
+        Format::Tiff => tiff::decode(path, file),
         Format::Exr => Err(ImageError::decode(
             path,
             format,
@@ -154,5 +135,6 @@ fn decode_with(
         height: height as usize,
         channels,
         samples,
+        nodata: None,
     })
 }

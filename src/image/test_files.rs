@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use image::{DynamicImage, ImageFormat};
 use tempfile::TempDir;
 
+use super::test_tiff::Tiff;
+
 /// A channel's name and samples, top row first.
 pub type NamedSamples<'a> = (&'a str, exr::prelude::FlatSamples);
 
@@ -26,21 +28,9 @@ impl Folder {
         path
     }
 
-    pub fn tiff<C: tiff::encoder::colortype::ColorType>(
-        &self,
-        width: u32,
-        height: u32,
-        samples: &[C::Inner],
-    ) -> PathBuf
-    where
-        [C::Inner]: tiff::encoder::TiffValue,
-    {
+    pub fn tiff(&self, picture: &Tiff) -> PathBuf {
         let path = self.path("picture.tif");
-        let file = std::fs::File::create(&path).unwrap();
-        tiff::encoder::TiffEncoder::new(file)
-            .unwrap()
-            .write_image::<C>(width, height, samples)
-            .unwrap();
+        std::fs::write(&path, picture.bytes()).unwrap();
         path
     }
 
@@ -80,6 +70,12 @@ impl Folder {
             .unwrap();
         path
     }
+}
+
+/// Numbers that compress badly, so that every part of a file matters.
+pub fn noise(count: usize) -> impl Iterator<Item = u32> {
+    let count = u32::try_from(count).unwrap_or(u32::MAX);
+    (0..count).map(|i| (i ^ 0x5bd1).wrapping_mul(0x9e37_79b1).rotate_left(i % 31))
 }
 
 /// Calls `load` for the file cut at every tenth of its length: every cut must be refused.

@@ -60,6 +60,8 @@ pub struct MeshAndMap {
     pub channel: Channel,
     /// Outside [0, 1].
     pub wrap: Wrap,
+    /// The height of texels without one.
+    pub nodata: Option<f32>,
     /// What heights mean.
     pub displacement: Displacement,
     /// How its prisms are made.
@@ -110,7 +112,9 @@ impl Loaded {
     pub fn from_mesh_and_map(source: &MeshAndMap) -> Result<Self, AssetError> {
         let mut builder = Builder::default();
         let MeshAndMap { mesh, map, .. } = source;
-        let map = builder.assets.heights(map, &source.channel, source.wrap)?;
+        let map = builder
+            .assets
+            .heights(map, &source.channel, source.wrap, source.nodata)?;
         let mut file = load_mesh(mesh)?;
         builder.warn_all(mesh, std::mem::take(&mut file.warnings));
         if let Some(projection) = source.texcoords {
@@ -311,7 +315,7 @@ impl Builder {
         };
         let map = self
             .assets
-            .heights(path, &channel, wrap.unwrap_or_default())
+            .heights(path, &channel, wrap.unwrap_or_default(), table.nodata)
             .map_err(|e| at.asset(e))?;
         displaced(name, mesh, (path, &map), displacement).map_err(|e| match e {
             AssetError::Heights { .. } => at.asset(e),

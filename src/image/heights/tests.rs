@@ -2,24 +2,19 @@ use exr::prelude::{Compression, FlatSamples, f16};
 use image::{
     ExtendedColorType, GrayImage, ImageBuffer, ImageEncoder, ImageFormat, Luma, Rgb, Rgba,
 };
-use tiff::encoder::colortype;
 
 use super::*;
-use crate::image::test_files::{Folder, each_tenth};
+use crate::image::test_files::{Folder, each_tenth, noise};
+use crate::image::test_tiff::Tiff;
 use crate::image::{ExrChannel, write_exr, write_png_gray16};
 
 fn texels(path: &Path, channel: &str) -> Result<(usize, usize, Texels), ImageError> {
     let Ok(channel) = channel.parse();
-    read_texels(path, &channel)
+    read_texels(path, &channel, None)
 }
 
 fn load(path: &Path) -> Result<DisplacementMap, ImageError> {
-    load_heights(path, &Channel::Luminance, Wrap::Repeat)
-}
-
-/// Numbers that compress badly, so that every part of a file matters.
-fn noise(count: usize) -> impl Iterator<Item = u32> {
-    (0..count as u32).map(|i| (i ^ 0x5bd1).wrapping_mul(0x9e37_79b1).rotate_left(i % 31))
+    load_heights(path, &Channel::Luminance, Wrap::Repeat, None)
 }
 
 #[test]
@@ -172,44 +167,125 @@ fn a_jpeg_is_read_as_8_bit() {
 }
 
 #[test]
-fn tiff_keeps_8_16_and_32_bit_samples() {
+fn tiff_heights_are_fractions_of_unsigned_samples_and_all_others_as_they_stand() {
     let folder = Folder::new();
-    let path = folder.tiff::<colortype::Gray8>(2, 2, &[1, 2, 3, 4]);
+    let heights = |picture: &Tiff| texels(&folder.tiff(picture), "luminance").unwrap().2;
     assert_eq!(
-        texels(&path, "luminance").unwrap().2,
+        heights(&Tiff::grey(2, 2, &[1u8, 2, 3, 4])),
         Texels::U8(vec![3, 4, 1, 2])
     );
-    let path = folder.tiff::<colortype::Gray16>(1, 2, &[1, 65_535]);
     assert_eq!(
-        texels(&path, "luminance").unwrap().2,
-        Texels::U16(vec![65_535, 1])
+        heights(&Tiff::grey(1, 2, &[1, u16::MAX])),
+        Texels::U16(vec![u16::MAX, 1])
     );
-    let path = folder.tiff::<colortype::Gray32Float>(1, 2, &[-0.1, 1e-7]);
     assert_eq!(
-        texels(&path, "luminance").unwrap().2,
+        heights(&Tiff::grey(3, 1, &[0, 1 << 31, u32::MAX])),
+        Texels::F32(vec![0.0, 0.5, 1.0])
+    );
+    assert_eq!(
+        heights(&Tiff::grey(2, 1, &[-5i16, 1500])),
+        Texels::F32(vec![-5.0, 1500.0])
+    );
+    assert_eq!(
+        heights(&Tiff::grey(1, 2, &[-0.1f32, 1e-7])),
         Texels::F32(vec![1e-7, -0.1])
     );
-    let path = folder.tiff::<colortype::RGB16>(1, 1, &[5, 600, 70]);
-    assert_eq!(texels(&path, "g").unwrap().2, Texels::U16(vec![600]));
+}
+
+#[test]
+fn bands_of_tiff_are_chosen_by_name_or_number() {
+    let folder = Folder::new();
+    let path = folder.tiff(&Tiff::rgb(1, 1, &[5u16, 600, 70]));
+    for channel in ["g", "2"] {
+        assert_eq!(texels(&path, channel).unwrap().2, Texels::U16(vec![600]));
+    }
     assert!(matches!(
         texels(&path, "luminance"),
         Err(ImageError::ChannelsDisagree { .. })
     ));
+    let bands: Vec<f32> = (1..=6).map(|band| band as f32).collect();
+    let path = folder.tiff(&Tiff::grey(1, 1, &bands).with(277, 3, [6]));
+    for (channel, band) in [("r", 1.0), ("1", 1.0), ("3", 3.0), ("6", 6.0)] {
+        assert_eq!(texels(&path, channel).unwrap().2, Texels::F32(vec![band]));
+    }
+    let missing = texels(&path, "7").unwrap_err().to_string();
+    assert!(missing.contains("R, G, B, 4, 5, 6"), "{missing}");
 }
 
 #[test]
-fn tiff_samples_that_would_lose_precision_are_refused() {
+fn a_texel_without_data_is_named_or_gets_a_height() {
     let folder = Folder::new();
-    let path = folder.tiff::<colortype::Gray32>(1, 1, &[70_000]);
+    let no_data = |picture: Tiff, nodata| {
+        let path = folder.tiff(&picture);
+        read_texels(&path, &Channel::Luminance, nodata).map(|(_, _, texels)| texels)
+    };
+    let metres = Tiff::grey(2, 2, &[7i16, -9999, 8, 9]).with_text(42113, "-9999");
+    let error = no_data(metres.clone(), None).unwrap_err();
+    assert!(matches!(error, ImageError::NoData { x: 1, y: 1, .. }));
+    let error = error.to_string();
+    for word in ["texel (1, 1)", "picture.tif", "-9999", "nodata"] {
+        assert!(error.contains(word), "{error}");
+    }
+    assert_eq!(
+        no_data(metres, Some(-1.5)).unwrap(),
+        Texels::F32(vec![8.0, 9.0, 7.0, -1.5])
+    );
+    let lowest = Tiff::grey(2, 1, &[f32::MIN, 0.5]).with_text(42113, "-3.4028234663852886e+38");
     assert!(matches!(
-        texels(&path, "luminance"),
-        Err(ImageError::UnsupportedSamples { .. })
+        no_data(lowest.clone(), None),
+        Err(ImageError::NoData { x: 0, y: 0, .. })
     ));
-    let path = folder.tiff::<colortype::GrayI16>(1, 1, &[-5]);
+    assert_eq!(
+        no_data(lowest, Some(0.0)).unwrap(),
+        Texels::F32(vec![0.0, 0.5])
+    );
+    // Fractions get fractions.
+    let codes = Tiff::grey(3, 1, &[0u8, 255, 51]).with_text(42113, "255");
+    assert_eq!(
+        no_data(codes, Some(0.25)).unwrap(),
+        Texels::F32(vec![0.0, 0.25, 0.2])
+    );
+    // White is 0 in the file, and no data is what the file says, too.
+    let white_is_zero = Tiff::grey(2, 1, &[0u8, 55]).with(262, 3, [0]);
     assert!(matches!(
-        texels(&path, "luminance"),
-        Err(ImageError::UnsupportedSamples { .. })
+        no_data(white_is_zero.with_text(42113, "55"), None),
+        Err(ImageError::NoData { x: 1, y: 0, .. })
     ));
+    let nibbles = Tiff::packed(2, 1, 4, vec![0x3f]).with_text(42113, "3");
+    assert!(matches!(
+        no_data(nibbles, None),
+        Err(ImageError::NoData { x: 0, y: 0, .. })
+    ));
+}
+
+#[test]
+fn what_no_texel_has_is_no_matter() {
+    let folder = Folder::new();
+    for declared in ["-9999", "256", "0.5", "nan", ""] {
+        let picture = Tiff::grey(2, 1, &[0u8, 255]).with_text(42113, declared);
+        for nodata in [None, Some(7.0)] {
+            let read = read_texels(&folder.tiff(&picture), &Channel::Luminance, nodata);
+            assert_eq!(read.unwrap().2, Texels::U8(vec![0, 255]), "{declared}");
+        }
+    }
+    let picture = Tiff::grey(2, 1, &[0u8, 255]).with_text(42113, "none");
+    let error = load(&folder.tiff(&picture)).unwrap_err();
+    assert!(matches!(error, ImageError::BadNoData { .. }), "{error}");
+}
+
+#[test]
+fn what_is_no_height_is_told_from_heights_without_a_declaration() {
+    let folder = Folder::new();
+    for odd in [f32::NAN, f32::NEG_INFINITY, f32::MIN, 1e20] {
+        let path = folder.tiff(&Tiff::grey(1, 2, &[odd, 3.0]));
+        let error = load(&path).unwrap_err();
+        assert!(
+            matches!(error, ImageError::NoHeight { x: 0, y: 1, .. }),
+            "{error}"
+        );
+        let filled = read_texels(&path, &Channel::Luminance, Some(-2.0));
+        assert_eq!(filled.unwrap().2, Texels::F32(vec![3.0, -2.0]));
+    }
 }
 
 const LOSSLESS: [Compression; 5] = [
@@ -304,7 +380,7 @@ fn a_height_that_is_not_finite_is_refused_with_its_place() {
     let channel = ExrChannel::floats("Y", samples);
     write_exr(&path, 2, 3, vec![channel], &[]).unwrap();
     let error = load(&path).unwrap_err();
-    assert!(matches!(error, ImageError::Map { .. }));
+    assert!(matches!(error, ImageError::NoHeight { .. }));
     let error = error.to_string();
     assert!(
         error.contains("(1, 1)") && error.contains("bad.exr"),
@@ -322,11 +398,8 @@ fn truncated_files_are_refused() {
     let picture = GrayImage::from_raw(size, size, gray.clone()).unwrap();
     each_tenth(&folder.picture(ImageFormat::Png, picture.clone()), load);
     each_tenth(&folder.picture(ImageFormat::Jpeg, picture), load);
-    each_tenth(&folder.tiff::<colortype::Gray8>(size, size, &gray), load);
-    each_tenth(
-        &folder.tiff::<colortype::Gray32Float>(size, size, &floats),
-        load,
-    );
+    each_tenth(&folder.tiff(&Tiff::grey(48, 48, &gray)), load);
+    each_tenth(&folder.tiff(&Tiff::grey(48, 48, &floats)), load);
     for compression in LOSSLESS.into_iter().chain(LOSSY) {
         let channels = vec![("Y", FlatSamples::F32(floats.clone()))];
         each_tenth(
@@ -349,7 +422,7 @@ fn damaged_files_are_read_or_refused() {
         std::fs::rename(folder.picture(format, picture.clone()), &path).unwrap();
         paths.push(path);
     }
-    paths.push(folder.tiff::<colortype::Gray32Float>(size as u32, size as u32, &floats));
+    paths.push(folder.tiff(&Tiff::grey(12, 12, &floats)));
     for compression in LOSSLESS.into_iter().chain(LOSSY) {
         let channels = vec![("Y", FlatSamples::F32(floats.clone()))];
         let path = folder.path(&format!("{compression}.exr").replace(' ', ""));
@@ -386,21 +459,10 @@ fn a_header_that_claims_too_much_is_refused_at_once() {
     std::fs::write(&path, png(100_000, 100_000, 16, 0, &[], &[0])).unwrap();
     refused(&path);
 
-    let tiff = folder.tiff::<colortype::Gray8>(2, 2, &[1, 2, 3, 4]);
-    let mut bytes = std::fs::read(&tiff).unwrap();
-    // Tags 256 and 257, ImageWidth and ImageLength, whatever their type.
-    let directory = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
-    for entry in 0..2 {
-        let at = directory + 2 + 12 * entry;
-        assert_eq!(
-            u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap()),
-            256 + entry as u16
-        );
-        bytes[at + 2..at + 4].copy_from_slice(&4u16.to_le_bytes());
-        bytes[at + 8..at + 12].copy_from_slice(&100_000u32.to_le_bytes());
-    }
-    std::fs::write(&path, bytes).unwrap();
-    refused(&path);
+    let side = [100_000];
+    let tiff = Tiff::grey(2, 2, &[1u8, 2, 3, 4]);
+    let tiff = tiff.with(256, 4, side).with(257, 4, side);
+    refused(&folder.tiff(&tiff));
 
     let channels = vec![("Y", FlatSamples::F32(vec![0.0; 4]))];
     let exr = folder.exr((2, 2), Compression::ZIP16, vec![(None, channels)]);

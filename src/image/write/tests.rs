@@ -27,7 +27,7 @@ fn an_exr_comes_back_with_layers_and_attributes() {
     let read = load_color(&path, ColorSpace::Linear).unwrap();
     assert!(matches!(read.pixels, ColorPixels::Linear(p) if p == beauty));
     let layer = Channel::Named("albedo.G".to_owned());
-    let map = load_heights(&path, &layer, Wrap::Clamp).unwrap();
+    let map = load_heights(&path, &layer, Wrap::Clamp, None).unwrap();
     assert_eq!(map.range(), (0.25, 0.75));
     let meta = exr::meta::MetaData::read_from_file(&path, false).unwrap();
     let other = &meta.headers[0].own_attributes.other;

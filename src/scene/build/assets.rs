@@ -16,24 +16,31 @@ use crate::surface::{DisplacementMap, Wrap};
 /// A channel of a picture, and how it goes on outside.
 type ChannelKey = (PathBuf, Channel, Wrap);
 
+/// A displacement map, and the height of texels without data.
+type HeightsKey = (PathBuf, Channel, Wrap, Option<f32>);
+
 /// What has been loaded so far.
 #[derive(Default)]
 pub(super) struct Assets {
-    heights: Vec<(ChannelKey, Arc<DisplacementMap>)>,
+    heights: Vec<(HeightsKey, Arc<DisplacementMap>)>,
     scalars: Vec<(ChannelKey, Arc<DisplacementMap>)>,
     colors: Vec<((PathBuf, ColorSpace, Vec3), Arc<ColorImage>)>,
     environments: Vec<(PathBuf, Arc<EnvironmentImage>)>,
 }
 
 impl Assets {
-    /// A channel of a picture as displacement map.
+    /// A channel of a picture as displacement map; `nodata` is the height of texels without.
     pub fn heights(
         &mut self,
         path: &Path,
         channel: &Channel,
         wrap: Wrap,
+        nodata: Option<f32>,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
-        channel_once(&mut self.heights, path, channel, wrap)
+        let key = (identity(path), channel.clone(), wrap, nodata);
+        once(&mut self.heights, key, || {
+            image::load_heights(path, channel, wrap, nodata)
+        })
     }
 
     /// A channel of a picture as a parameter of a material; apart from the heights, which are reported and edited.
@@ -43,7 +50,10 @@ impl Assets {
         channel: &Channel,
         wrap: Wrap,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
-        channel_once(&mut self.scalars, path, channel, wrap)
+        let key = (identity(path), channel.clone(), wrap);
+        once(&mut self.scalars, key, || {
+            image::load_heights(path, channel, wrap, None)
+        })
     }
 
     /// A colour picture, times `tint`.
@@ -72,17 +82,6 @@ impl Assets {
         maps.map(|((path, ..), map)| MapFile { path, map })
             .collect()
     }
-}
-
-/// A channel of a picture, known or loaded.
-fn channel_once(
-    known: &mut Vec<(ChannelKey, Arc<DisplacementMap>)>,
-    path: &Path,
-    channel: &Channel,
-    wrap: Wrap,
-) -> Result<Arc<DisplacementMap>, AssetError> {
-    let key = (identity(path), channel.clone(), wrap);
-    once(known, key, || image::load_heights(path, channel, wrap))
 }
 
 /// What `known` has for `key`, else what `load` gives. A scene names few files: no hashing is needed.
@@ -122,7 +121,10 @@ pub(super) fn embedded_scalar(
     channel: &Channel,
     wrap: Wrap,
 ) -> Result<Arc<DisplacementMap>, AssetError> {
-    unpacked(path, bytes, |file| image::load_heights(file, channel, wrap)).map(Arc::new)
+    unpacked(path, bytes, |file| {
+        image::load_heights(file, channel, wrap, None)
+    })
+    .map(Arc::new)
 }
 
 /// What `load` makes of a picture that the mesh file at `path` holds: its readers want a file.

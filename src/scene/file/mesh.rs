@@ -54,6 +54,8 @@ pub(in crate::scene) struct DisplacementTable {
     pub scale: Option<f32>,
     pub midlevel: Option<f32>,
     pub wrap: Option<Wrap>,
+    /// The height of texels without one.
+    pub nodata: Option<f32>,
     pub uv: Option<UvTransform>,
     pub prisms: PrismOptions,
     /// Default: what the material needs.
@@ -121,6 +123,7 @@ impl DisplacementTable {
             "scale",
             "midlevel",
             "wrap",
+            "nodata",
             "uv",
             "march",
             "dt",
@@ -140,6 +143,7 @@ impl DisplacementTable {
             scale: section.optional("scale", |i| i.number(SCALE, |x| x != 0.0))?,
             midlevel: section.optional("midlevel", |i| i.number("a height", |_| true))?,
             wrap: section.optional("wrap", wrap)?,
+            nodata: section.optional("nodata", |i| i.number("a height", |_| true))?,
             uv: section.optional("uv", uv_transform)?,
             prisms: PrismOptions {
                 march,
