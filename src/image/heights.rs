@@ -5,31 +5,34 @@ use std::path::Path;
 use super::channel::{self, Channel};
 use super::exr_file::ExrFile;
 use super::raster::{self, Raster, Samples};
-use super::{Format, ImageError, format};
+use super::source::Source;
+use super::{Format, ImageError};
 use crate::surface::{DisplacementMap, Texels, Wrap};
 
-/// Reads one channel of a PNG, JPEG, TIFF, EXR or Radiance HDR picture as a displacement map.
+/// Reads one channel of a picture as a displacement map.
 ///
-/// 8-bit pictures become [`Texels::U8`], 16-bit ones [`Texels::U16`], halves and floats [`Texels::F32`]. The picture's bottom
+/// 8-bit pictures become [`Texels::U8`], 16-bit ones [`Texels::U16`], halves, floats and 32-bit integers [`Texels::F32`]. The picture's bottom
 /// row is the map's first. With [`Channel::Luminance`] the colour channels must agree: exactly for integers, to
 /// half precision (1/1024) for floats, since lossy EXR compression treats each channel for itself.
-pub fn load_heights(
-    path: &Path,
+pub fn load_heights<'a>(
+    picture: impl Into<Source<'a>>,
     channel: &Channel,
     wrap: Wrap,
 ) -> Result<DisplacementMap, ImageError> {
-    let (width, height, texels) = read_texels(path, channel)?;
+    let picture = picture.into();
+    let (width, height, texels) = read_texels(picture, channel)?;
     DisplacementMap::new(width, height, texels, wrap).map_err(|source| ImageError::Map {
-        path: path.to_owned(),
+        path: picture.path().to_owned(),
         source,
     })
 }
 
 /// Width, height and heights, bottom row first.
-fn read_texels(path: &Path, channel: &Channel) -> Result<(usize, usize, Texels), ImageError> {
-    let (format, file) = format::open(path)?;
-    if format == Format::Exr {
-        let file = ExrFile::open(path, file)?;
+fn read_texels(picture: Source, channel: &Channel) -> Result<(usize, usize, Texels), ImageError> {
+    let input = picture.open()?;
+    let path = input.path;
+    if input.format == Format::Exr {
+        let file = ExrFile::open(input)?;
         let chosen = channel::select(channel, &file.channels, path)?;
         let names = chosen.iter().map(|&i| file.channels[i].clone()).collect();
         let read = file.read(&chosen)?;
@@ -41,7 +44,7 @@ fn read_texels(path: &Path, channel: &Channel) -> Result<(usize, usize, Texels),
         let heights = chosen.agreed(read.planes, floats_agree)?;
         return Ok((read.width, read.height, Texels::F32(heights)));
     }
-    let raster = raster::decode(path, format, file)?;
+    let raster = raster::decode(input)?;
     let indices = channel::select(channel, &raster.channels, path)?;
     let chosen = Chosen {
         path,

@@ -1,7 +1,6 @@
 //! TIFF through the `tiff` crate itself: `image` refuses grey floats, which is what displacement maps are.
 
-use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, Seek};
 use std::path::Path;
 
 use tiff::ColorType;
@@ -15,7 +14,7 @@ const EXPECTED: &str =
     "grey or RGB, with or without alpha, in 8- or 16-bit unsigned or float samples is expected";
 
 /// Decodes the first picture of a TIFF file.
-pub(super) fn decode(path: &Path, file: BufReader<File>) -> Result<Raster, ImageError> {
+pub(super) fn decode(path: &Path, file: impl BufRead + Seek) -> Result<Raster, ImageError> {
     let failed = |error: tiff::TiffError| ImageError::decode(path, Format::Tiff, error);
     let unsupported = |found: String| ImageError::UnsupportedSamples {
         path: path.to_owned(),
