@@ -58,13 +58,18 @@ impl<'a> ExrFile<'a> {
             |error: &dyn ToString| ImageError::decode(path, Format::Exr, error.to_string());
         let meta = guarded(|| {
             let meta = MetaData::read_from_buffered(&mut input.bytes, true)?;
-            MetaData::validate(&meta.headers, false)?;
+            // The crate refuses all subsampling, which is asked about where a channel is read.
+            let mut full = meta.headers.clone();
+            for channel in full.iter_mut().flat_map(|header| &mut header.channels.list) {
+                channel.sampling = Vec2(1, 1);
+            }
+            MetaData::validate(&full, false)?;
             Ok(meta)
         });
         let meta: MetaData = meta.map_err(|reason| failed(&reason))?.map_err(
             |error: exr::error::Error| match error {
                 exr::error::Error::NotSupported(what) if what.contains("deep") => {
-                    unsupported(path, "deep data".to_owned())
+                    unsupported(path, "deep data".to_owned(), FULL)
                 }
                 other => failed(&other),
             },
@@ -80,6 +85,7 @@ impl<'a> ExrFile<'a> {
         for (part, header) in meta.headers.iter().enumerate() {
             let size = header.layer_size;
             check_size(path, size.width() as u64, size.height() as u64)?;
+            check_sampling(path, header)?;
             let prefix = match &header.own_attributes.layer_name {
                 Some(name) => format!("{name}."),
                 None => String::new(),
@@ -119,6 +125,7 @@ impl<'a> ExrFile<'a> {
                 return Err(unsupported(
                     self.path,
                     format!("the subsampled channel {name}"),
+                    FULL,
                 ));
             }
             for (i, plane) in of_part
@@ -143,7 +150,7 @@ impl<'a> ExrFile<'a> {
         };
         let read = self.planes(part, &channels)?;
         let colors = exr_chroma::colors(&header, read)
-            .ok_or_else(|| unsupported(self.path, "chroma of an odd sampling".to_owned()))?;
+            .ok_or_else(|| unsupported(self.path, "subsampled luminance".to_owned(), FULL))?;
         let windowed = colors.into_iter().map(|plane| self.window(&header, plane));
         let planes = windowed.collect::<Result<_, _>>()?;
         Ok(self.sized(planes))
@@ -173,7 +180,8 @@ impl<'a> ExrFile<'a> {
             let found = format!(
                 "a data window of {across}x{down} pixels in a display window of {width}x{height}"
             );
-            return Err(unsupported(self.path, found));
+            let expected = "one that the pixels nearly fill is expected";
+            return Err(unsupported(self.path, found, expected));
         }
         // Where the data start in the display window, perhaps outside of it.
         let x = i64::from(left) - i64::from(display.position.x());
@@ -232,6 +240,7 @@ impl<'a> ExrFile<'a> {
             return Err(unsupported(
                 self.path,
                 format!("the subsampled channel {}", odd.name),
+                FULL,
             ));
         }
         let all: Vec<usize> = (0..channels.len()).collect();
@@ -282,6 +291,25 @@ impl<'a> ExrFile<'a> {
     }
 }
 
+/// Refuses samplings that do not divide the data window, as OpenEXR demands, and those of tiles.
+fn check_sampling(path: &Path, header: &Header) -> Result<(), ImageError> {
+    let Vec2(left, top) = header.own_attributes.layer_position;
+    let Vec2(width, height) = header.layer_size;
+    for channel in &header.channels.list {
+        let Vec2(across, down) = channel.sampling;
+        let divides = |sampling: usize, start: i32, size: usize| {
+            sampling > 0 && i64::from(start) % sampling as i64 == 0 && size % sampling == 0
+        };
+        let sound = divides(across, left, width) && divides(down, top, height);
+        if !sound || (header.blocks.has_tiles() && channel.sampling != Vec2(1, 1)) {
+            let name = &channel.name;
+            let found = format!("the channel {name} sampled at every {across} x {down} pixels");
+            return Err(unsupported(path, found, FULL));
+        }
+    }
+    Ok(())
+}
+
 /// Turns rows from the top into rows from the bottom.
 fn flip<T>(samples: &mut [T], width: usize) {
     let height = samples.len() / width;
@@ -291,11 +319,13 @@ fn flip<T>(samples: &mut [T], width: usize) {
     }
 }
 
-fn unsupported(path: &Path, found: String) -> ImageError {
+const FULL: &str = "flat channels at full resolution are expected";
+
+fn unsupported(path: &Path, found: String, expected: &'static str) -> ImageError {
     ImageError::UnsupportedSamples {
         path: path.to_owned(),
         found,
-        expected: "flat channels at full resolution, that fill their display window, are expected",
+        expected,
     }
 }
 

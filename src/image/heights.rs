@@ -28,7 +28,10 @@ pub fn load_heights<'a>(
 }
 
 /// Width, height and heights, bottom row first.
-fn read_texels(picture: Source, channel: &Channel) -> Result<(usize, usize, Texels), ImageError> {
+pub(super) fn read_texels(
+    picture: Source,
+    channel: &Channel,
+) -> Result<(usize, usize, Texels), ImageError> {
     let input = picture.open()?;
     let path = input.path;
     if input.format == Format::Exr {

@@ -49,4 +49,6 @@ pub(crate) fn fingerprint(bytes: &[u8]) -> String {
 }
 
 #[cfg(test)]
+mod damage_tests;
+#[cfg(test)]
 mod test_files;

@@ -157,3 +157,6 @@ impl Rows {
         Some(pixels)
     }
 }
+
+#[cfg(test)]
+mod tests;

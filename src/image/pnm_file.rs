@@ -105,7 +105,8 @@ fn integers(
         if text {
             for _ in 0..part {
                 let value = number(&mut input.bytes).map_err(failed)?;
-                raw.push(u16::try_from(value).unwrap_or(u16::MAX));
+                let beyond = |_| failed(format!("a sample is {value}"));
+                raw.push(u16::try_from(value).map_err(beyond)?);
             }
         } else if largest < 256 {
             fill(&mut input.bytes, &mut buffer[..part]).map_err(failed)?;

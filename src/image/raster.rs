@@ -69,7 +69,14 @@ pub(super) fn plane<T: Copy>(
 }
 
 /// Decodes a picture of a format other than EXR.
-pub(super) fn decode(mut input: Input) -> Result<Raster, ImageError> {
+pub(super) fn decode(input: Input) -> Result<Raster, ImageError> {
+    let (path, format) = (input.path, input.format);
+    // The crates mean never to panic; that is too much to rely on for every damaged file.
+    guarded(|| decode_unguarded(input))
+        .unwrap_or_else(|reason| Err(ImageError::decode(path, format, reason)))
+}
+
+fn decode_unguarded(mut input: Input) -> Result<Raster, ImageError> {
     match input.format {
         Format::Png => png_file::decode(input),
         Format::Jpeg => {
@@ -132,10 +139,7 @@ fn decode_with(
     limits.max_alloc = Some(16 * MAX_PIXELS); // four floats per pixel, the most there is
     reader.limits(limits);
     let failed = |error: image::ImageError| input.failed(error);
-    let stumbled = |reason: String| input.failed(reason);
-    let decoder = guarded(|| reader.into_decoder())
-        .map_err(stumbled)?
-        .map_err(failed)?;
+    let decoder = reader.into_decoder().map_err(failed)?;
     let (width, height) = decoder.dimensions();
     check_size(input.path, width.into(), height.into())?;
     if u64::from(width) * u64::from(height) > most_pixels {
@@ -143,9 +147,7 @@ fn decode_with(
             "{length} bytes cannot hold {width}x{height} pixels"
         )));
     }
-    let picture = guarded(|| DynamicImage::from_decoder(decoder))
-        .map_err(stumbled)?
-        .map_err(failed)?;
+    let picture = DynamicImage::from_decoder(decoder).map_err(failed)?;
     let channels = channel_names(picture.color().channel_count().into());
     let samples = match picture {
         DynamicImage::ImageLuma8(p) => Samples::U8(p.into_raw()),
