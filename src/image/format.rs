@@ -22,7 +22,7 @@ pub enum Format {
     Bmp,
     /// Truevision TGA.
     Tga,
-    /// PBM, PGM, PPM: bits, greys or colours in whole numbers, as text or binary.
+    /// PBM, PGM, PPM, PAM: bits, greys or colours in whole numbers, as text or binary.
     Pnm,
     /// PFM: greys or colours in floats.
     Pfm,
@@ -91,7 +91,7 @@ impl Format {
             {
                 Some(Self::Bmp)
             }
-            [b'P', b'1'..=b'6', c, ..] if c.is_ascii_whitespace() || *c == b'#' => Some(Self::Pnm),
+            [b'P', b'1'..=b'7', c, ..] if c.is_ascii_whitespace() || *c == b'#' => Some(Self::Pnm),
             [b'P', b'F' | b'f', c, ..] if c.is_ascii_whitespace() => Some(Self::Pfm),
             _ if is_tga(start, path) => Some(Self::Tga),
             _ => None,

@@ -1,4 +1,4 @@
-//! PBM, PGM and PPM (P1 to P6), and PFM, their brother of floats.
+//! PBM, PGM, PPM (P1 to P6) and PAM (P7), and PFM, their brother of floats.
 //!
 //! Read here because the crates do not scale by the largest value that the header names, and take memory on its word.
 
@@ -12,30 +12,89 @@ use super::{Format, ImageError};
 /// Longest number in a header or among samples in text.
 const MAX_DIGITS: usize = 16;
 
+/// What a header says.
+struct Header {
+    width: u64,
+    height: u64,
+    channels: usize,
+    /// The largest value of whole numbers; 1 for bits, 0 where floats follow.
+    largest: u64,
+}
+
 /// Decodes the first picture of the file.
 pub(super) fn decode(mut input: Input) -> Result<Raster, ImageError> {
-    let [_, kind] = read(&mut input.bytes).map_err(|reason| input.failed(reason))?;
-    let size = (|| Ok([number(&mut input.bytes)?, number(&mut input.bytes)?]))();
-    let [width, height] = size.map_err(|reason: String| input.failed(reason))?;
-    check_size(input.path, width, height)?;
-    let channels = if matches!(kind, b'3' | b'6' | b'F') {
-        3
-    } else {
-        1
-    };
-    let (width, height) = (width as usize, height as usize);
-    let row = width * channels;
+    let bytes = &mut input.bytes;
+    let header = read::<2>(bytes).and_then(|[_, kind]| Ok((kind, Header::read(bytes, kind)?)));
+    let (kind, header) = header.map_err(|reason| input.failed(reason))?;
+    check_size(input.path, header.width, header.height)?;
+    let (width, height) = (header.width as usize, header.height as usize);
+    let row = width * header.channels;
     let samples = match (input.format, kind) {
         (Format::Pfm, _) => Samples::F32(floats(&mut input, row, height)?),
         (_, b'1' | b'4') => Samples::U8(bits(&mut input, kind == b'1', row, height)?),
-        _ => integers(&mut input, matches!(kind, b'2' | b'3'), row, height)?,
+        (_, kind) => {
+            let text = matches!(kind, b'2' | b'3');
+            integers(&mut input, text, row * height, header.largest)?
+        }
     };
     Ok(Raster {
         width,
         height,
-        channels: channel_names(channels),
+        channels: channel_names(header.channels),
         samples,
     })
+}
+
+impl Header {
+    fn read(bytes: &mut Box<dyn Bytes + '_>, kind: u8) -> Result<Self, String> {
+        if kind == b'7' {
+            return Self::of_pam(bytes);
+        }
+        Ok(Self {
+            width: number(bytes)?,
+            height: number(bytes)?,
+            channels: if matches!(kind, b'3' | b'6' | b'F') {
+                3
+            } else {
+                1
+            },
+            largest: match kind {
+                b'1' | b'4' => 1,
+                b'F' | b'f' => 0,
+                _ => number(bytes)?,
+            },
+        })
+    }
+
+    /// A header of words and their values.
+    fn of_pam(bytes: &mut Box<dyn Bytes + '_>) -> Result<Self, String> {
+        let [mut width, mut height, mut depth, mut largest] = [None; 4];
+        loop {
+            match &word(bytes)?[..] {
+                "WIDTH" => width = Some(number(bytes)?),
+                "HEIGHT" => height = Some(number(bytes)?),
+                "DEPTH" => depth = Some(number(bytes)?),
+                "MAXVAL" => largest = Some(number(bytes)?),
+                // The number of samples says as much.
+                "TUPLTYPE" => skip_line(bytes)?,
+                "ENDHDR" => break,
+                other => return Err(format!("found {other:?} in its header")),
+            }
+        }
+        let (Some(width), Some(height), Some(depth @ 1..=4), Some(largest)) =
+            (width, height, depth, largest)
+        else {
+            return Err(
+                "WIDTH, HEIGHT, DEPTH from 1 to 4 and MAXVAL are expected in its header".into(),
+            );
+        };
+        Ok(Self {
+            width,
+            height,
+            channels: depth as usize,
+            largest,
+        })
+    }
 }
 
 /// Black and white, 0 and 255: a 1 in the file is black.
@@ -89,19 +148,18 @@ fn text_bit(bytes: &mut impl Read) -> Result<u8, String> {
 fn integers(
     input: &mut Input,
     text: bool,
-    row: usize,
-    height: usize,
+    total: usize,
+    largest: u64,
 ) -> Result<Samples, ImageError> {
     let failed = |reason: String| ImageError::decode(input.path, Format::Pnm, reason);
-    let largest = number(&mut input.bytes).map_err(failed)?;
     let largest = u16::try_from(largest).ok().filter(|&largest| largest > 0);
     let largest = largest.ok_or_else(|| failed("its largest value is not in 1 .. 65535".into()))?;
     let mut raw: Vec<u16> = Vec::new();
-    let mut buffer = vec![0; (2 * row).min(1 << 16)];
-    let mut left = row * height;
+    let mut buffer = vec![0; (2 * total).min(1 << 16)];
+    let mut left = total;
     while left > 0 {
         let part = left.min(buffer.len() / 2);
-        make_room(&mut raw, part, row * height, input.path)?;
+        make_room(&mut raw, part, total, input.path)?;
         if text {
             for _ in 0..part {
                 let value = number(&mut input.bytes).map_err(failed)?;

@@ -92,3 +92,19 @@ fn what_is_no_picture_is_refused() {
         assert!(refused.contains("a.pnm"), "{refused}");
     }
 }
+
+#[test]
+fn pam_names_what_it_says() {
+    let header = |depth: u32| {
+        format!("P7\nWIDTH 2\n# why\nHEIGHT 1\nDEPTH {depth}\nMAXVAL 255\nTUPLTYPE ANY\nENDHDR\n")
+    };
+    for (depth, channels) in [(1, "Y"), (2, "Y A"), (3, "R G B"), (4, "R G B A")] {
+        let samples: Vec<u8> = (1..=2 * depth as u8).collect();
+        let file = [header(depth).as_bytes(), &samples].concat();
+        assert_eq!(read(&file).unwrap().channels.join(" "), channels);
+        assert_eq!(bytes_of(&file), samples);
+    }
+    for broken in [header(5), header(0), header(1).replace("WIDTH 2\n", "")] {
+        assert!(read(&[broken.as_bytes(), &[0; 64]].concat()).is_err());
+    }
+}
