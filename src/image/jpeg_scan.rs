@@ -57,7 +57,9 @@ impl Walk {
             match marker {
                 0xc0..=0xc2 => self.start_frame(segment, marker == 0xc2)?,
                 0xc4 => self.tables(segment)?,
-                0xc3 | 0xc5..=0xc7 | 0xc9..=0xcb | 0xcd..=0xcf => return Err(unread(marker)),
+                0xc3 | 0xc5..=0xc7 | 0xc9..=0xcb | 0xcd..=0xcf | 0xf7 => {
+                    return Err(unread(marker));
+                }
                 0xdd => self.restart_interval = short(segment, 0)?.into(),
                 0xda => {
                     let scan = self.scan_of(segment)?;
@@ -376,6 +378,7 @@ fn unread(marker: u8) -> String {
     let kind = match marker {
         0xc3 => "lossless",
         0xc5..=0xc7 => "hierarchical",
+        0xf7 => "near-lossless (JPEG-LS)",
         _ => "arithmetic-coded",
     };
     format!("{kind} JPEG is not supported; baseline or progressive is expected")
