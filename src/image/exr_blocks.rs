@@ -6,10 +6,11 @@
 use exr::compression::Compression;
 use exr::math::Vec2;
 use exr::meta::BlockDescription;
-use exr::meta::attribute::{IntegerBounds, SampleType};
+use exr::meta::attribute::{ChannelDescription, IntegerBounds, SampleType};
 use exr::meta::header::Header;
 use exr::prelude::f16;
 
+use super::exr_b44;
 use super::exr_dwa;
 use super::exr_file::ExrFile;
 use super::exr_picture::ExrSamples;
@@ -189,7 +190,7 @@ fn decompress(header: &Header, block: Block, coded: Vec<u8>) -> Result<Vec<u8>, 
     let rows = block.y..block.y + block.height;
     let row_bytes = |y: usize| -> usize {
         let channels = header.channels.list.iter();
-        let bytes = |c: &exr::meta::attribute::ChannelDescription| {
+        let bytes = |c: &ChannelDescription| {
             samples_across(c.sampling, block, y) * c.sample_type.bytes_per_sample()
         };
         channels.map(bytes).sum()
@@ -200,6 +201,11 @@ fn decompress(header: &Header, block: Block, coded: Vec<u8>) -> Result<Vec<u8>, 
         return Ok(coded);
     }
     plausible(header, block, &coded, size)?;
+    let full = |c: &ChannelDescription| c.sampling == Vec2(1, 1);
+    let b44 = matches!(header.compression, Compression::B44 | Compression::B44A);
+    if b44 && !header.channels.list.iter().all(full) {
+        return guarded(|| interleaved(header, block, &coded))?;
+    }
     let mut header = header.clone();
     // The crate takes all channels for full ones; what it multiplies by is set so that the product is right.
     header.channels.bytes_per_pixel = size / (block.width * block.height);
@@ -219,6 +225,29 @@ fn decompress(header: &Header, block: Block, coded: Vec<u8>) -> Result<Vec<u8>, 
         true => Ok(decoded),
         false => Err("a block has another size than its pixels take".into()),
     }
+}
+
+/// A B44 block of subsampled channels, row by row.
+fn interleaved(header: &Header, block: Block, coded: &[u8]) -> Result<Vec<u8>, String> {
+    let channels = &header.channels.list;
+    let rows = || block.y..block.y + block.height;
+    let size = |c: &ChannelDescription| {
+        let down = rows().filter(|y| y.is_multiple_of(c.sampling.y())).count();
+        (block.width / c.sampling.x(), down)
+    };
+    let sizes: Vec<(usize, usize)> = channels.iter().map(size).collect();
+    let planes = exr_b44::planes(header, &sizes, coded)?;
+    let mut starts = vec![0; planes.len()];
+    let mut bytes = Vec::new();
+    for y in rows() {
+        for ((channel, plane), start) in channels.iter().zip(&planes).zip(&mut starts) {
+            let count = samples_across(channel.sampling, block, y);
+            let end = *start + count * channel.sample_type.bytes_per_sample();
+            bytes.extend_from_slice(&plane[*start..end]);
+            *start = end;
+        }
+    }
+    Ok(bytes)
 }
 
 /// Refuses a block that claims more than its bytes can hold, before memory is taken for it.

@@ -97,3 +97,27 @@ fn weights(header: &Header) -> DVec3 {
         false => REC_709,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use exr::meta::attribute::Chromaticities;
+    use exr::prelude::{ImageAttributes, SmallVec, Vec2};
+
+    use super::*;
+
+    #[test]
+    fn the_primaries_of_rec_709_have_its_weights() {
+        let mut image = ImageAttributes::with_size((2, 2));
+        image.chromaticities = Some(Chromaticities {
+            red: Vec2(0.64, 0.33),
+            green: Vec2(0.3, 0.6),
+            blue: Vec2(0.15, 0.06),
+            white: Vec2(0.3127, 0.329),
+        });
+        let header = Header::new("".into(), (2, 2), SmallVec::new());
+        assert_eq!(weights(&header), REC_709);
+        let header = header.with_shared_attributes(image);
+        assert!((weights(&header) - REC_709).length() < 1e-3);
+        assert!((weights(&header).element_sum() - 1.0).abs() < 1e-6);
+    }
+}

@@ -298,7 +298,7 @@ fn check_sampling(path: &Path, header: &Header) -> Result<(), ImageError> {
     for channel in &header.channels.list {
         let Vec2(across, down) = channel.sampling;
         let divides = |sampling: usize, start: i32, size: usize| {
-            sampling > 0 && i64::from(start) % sampling as i64 == 0 && size % sampling == 0
+            sampling > 0 && i64::from(start) % sampling as i64 == 0 && size.is_multiple_of(sampling)
         };
         let sound = divides(across, left, width) && divides(down, top, height);
         if !sound || (header.blocks.has_tiles() && channel.sampling != Vec2(1, 1)) {

@@ -154,7 +154,10 @@ impl Walk {
                 frame.components[component].reach(row, scan.components.len() > 1)?;
             }
             for column in 0..columns {
-                if self.restart_interval > 0 && units > 0 && units % self.restart_interval == 0 {
+                if self.restart_interval > 0
+                    && units > 0
+                    && units.is_multiple_of(self.restart_interval)
+                {
                     bits.restart(units / self.restart_interval - 1)?;
                     blocks.empty = 0;
                 }

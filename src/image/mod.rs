@@ -11,6 +11,7 @@ mod channel;
 mod color;
 mod environment;
 mod error;
+mod exr_b44;
 mod exr_blocks;
 mod exr_chroma;
 mod exr_dwa;

@@ -253,7 +253,7 @@ fn luminance_chroma(
     let [r, g, b] = pixel;
     let y = 0.2126 * r + 0.7152 * g + 0.0722 * b;
     let row = |line: usize| {
-        let chroma = if line % 2 == 0 { width / 2 } else { 0 };
+        let chroma = if line.is_multiple_of(2) { width / 2 } else { 0 };
         let blue = std::iter::repeat_n((b - y) / y, chroma);
         let red = std::iter::repeat_n((r - y) / y, chroma);
         let samples = blue.chain(red).chain(std::iter::repeat_n(y, width));
@@ -294,6 +294,13 @@ fn luminance_and_chroma_are_height_and_colour() {
     let pixel = [0.5, 0.25, 0.75];
     let y = 0.2126 * pixel[0] + 0.7152 * pixel[1] + 0.0722 * pixel[2];
     for (compression, name) in COMPRESSIONS.iter().enumerate() {
+        // The crate does not write fewer samples in these.
+        if matches!(
+            name,
+            Compression::PXR24 | Compression::B44 | Compression::B44A
+        ) {
+            continue;
+        }
         luminance_chroma(&path, (18, 38), pixel, compression as u8);
         let (width, height, texels) = heights(&path, "luminance").unwrap();
         assert_eq!((width, height), (18, 38));

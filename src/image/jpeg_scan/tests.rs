@@ -92,12 +92,12 @@ fn a_picture_cut_anywhere_is_refused_whatever_is_put_behind_it() {
 
 #[test]
 fn scans_must_give_all_bits_of_all_coefficients() {
-    for missing in 0..SCANS.len() {
+    for (missing, scan) in SCANS.iter().enumerate() {
         let mut scans = SCANS.to_vec();
         scans.remove(missing);
         assert!(check(&progressive(&scans)).is_err(), "without {missing}");
         let mut scans = SCANS.to_vec();
-        scans.insert(missing, SCANS[missing]);
+        scans.insert(missing, *scan);
         assert!(check(&progressive(&scans)).is_err(), "{missing} twice");
     }
 }
