@@ -53,7 +53,7 @@ struct Grid {
 impl Planes {
     /// The channels with these indices of a part.
     pub fn read(file: &mut ExrFile, part: usize, wanted: &[usize]) -> Result<Self, ImageError> {
-        let header = file.meta.headers[part].clone();
+        let mut header = file.meta.headers[part].clone();
         let (width, height) = (header.layer_size.width(), header.layer_size.height());
         let grid = Grid::of(&header);
         let table = table(file, part)?;
@@ -76,7 +76,7 @@ impl Planes {
                 let block = grid.block(&header, column, row);
                 let start = table[row * grid.count.0 + column];
                 let coded = chunk(file, part, &header, &grid, (column, row), start)?;
-                let decoded = decompress(&header, block, coded)
+                let decoded = decompress(&mut header, block, coded)
                     .map_err(|reason| ImageError::decode(file.path, Format::Exr, reason))?;
                 blocks.push((block, decoded));
             }
@@ -186,7 +186,7 @@ fn samples_across(sampling: Vec2<usize>, block: Block, y: usize) -> usize {
 }
 
 /// The bytes of a block, row by row, channel by channel within a row.
-fn decompress(header: &Header, block: Block, coded: Vec<u8>) -> Result<Vec<u8>, String> {
+fn decompress(header: &mut Header, block: Block, coded: Vec<u8>) -> Result<Vec<u8>, String> {
     let rows = block.y..block.y + block.height;
     let row_bytes = |y: usize| -> usize {
         let channels = header.channels.list.iter();
@@ -206,7 +206,6 @@ fn decompress(header: &Header, block: Block, coded: Vec<u8>) -> Result<Vec<u8>, 
     if b44 && !header.channels.list.iter().all(full) {
         return guarded(|| interleaved(header, block, &coded))?;
     }
-    let mut header = header.clone();
     // The crate takes all channels for full ones; what it multiplies by is set so that the product is right.
     header.channels.bytes_per_pixel = size / (block.width * block.height);
     if header.channels.bytes_per_pixel * block.width * block.height != size {
@@ -219,7 +218,7 @@ fn decompress(header: &Header, block: Block, coded: Vec<u8>) -> Result<Vec<u8>, 
     let compression = header.compression;
     // In this thread: a decoder that panics in a worker of its own takes the whole program down.
     let decoded =
-        guarded(|| compression.decompress_image_section_from_le(&header, coded, place, false))?;
+        guarded(|| compression.decompress_image_section_from_le(header, coded, place, false))?;
     let decoded = decoded.map_err(|error| error.to_string())?;
     match decoded.len() == size {
         true => Ok(decoded),

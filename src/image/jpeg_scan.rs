@@ -32,9 +32,13 @@ pub(super) fn check(bytes: &[u8]) -> Checked<()> {
     Walk::default().picture(bytes)
 }
 
+/// Most scans: each walks over all blocks, which runs of empty ones pack into next to no bytes. The decoder's limit, too.
+const MOST_SCANS: usize = 100;
+
 #[derive(Default)]
 struct Walk {
     frame: Option<Frame>,
+    scans: usize,
     /// DC and AC tables.
     tables: [[Option<Huffman>; 4]; 2],
     restart_interval: usize,
@@ -62,6 +66,10 @@ impl Walk {
                 }
                 0xdd => self.restart_interval = short(segment, 0)?.into(),
                 0xda => {
+                    self.scans += 1;
+                    if self.scans > MOST_SCANS {
+                        return Err(format!("it has more than {MOST_SCANS} scans"));
+                    }
                     let scan = self.scan_of(segment)?;
                     rest = self.scan(&scan, rest)?;
                 }

@@ -103,6 +103,22 @@ fn scans_must_give_all_bits_of_all_coefficients() {
 }
 
 #[test]
+fn a_coefficient_may_come_at_a_time_but_no_hundreds_of_scans() {
+    let mut scans = vec![([0, 0, 0x00], "0 0")];
+    scans.extend((1..64).map(|k| ([k, k, 0x00], "10 0")));
+    check(&progressive(&scans)).unwrap();
+    scans.truncate(1);
+    for approximation in [0x01, 0x10] {
+        scans.extend((1..64).map(|k| ([k, k, approximation], "10 0")));
+    }
+    assert!(
+        check(&progressive(&scans))
+            .unwrap_err()
+            .contains("100 scans")
+    );
+}
+
+#[test]
 fn a_few_bytes_make_no_large_picture() {
     let mut file = baseline();
     let frame = file
