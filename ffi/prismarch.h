@@ -115,7 +115,7 @@ typedef struct prismarch_texels {
  * (i + 0.5) / width. For pictures whose row 0 is the top let `data` be the last row and `row_stride` negative. */
 prismarch_status prismarch_map_create(uint32_t width, uint32_t height, const prismarch_texels *texels, prismarch_wrap wrap,
                                       prismarch_map **map, prismarch_error *error);
-/* The same from a PNG, JPEG, TIFF, EXR or HDR file in its own precision (its bottom row is row 0). `channel`: NULL for luminance, or
+/* The same from a picture file (docs/scene.md, Pictures) in its own precision (its bottom row is row 0). `channel`: NULL for luminance, or
  * R, G, B, A, the name of an EXR channel or the number of a band, from 1. Texels without data are an error. */
 prismarch_status prismarch_map_load(const char *path, const char *channel, prismarch_wrap wrap, prismarch_map **map,
                                     prismarch_error *error);

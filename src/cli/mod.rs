@@ -25,6 +25,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::files::guard::keep_caught_panics_quiet;
 use error::CliError;
 
 /// Exit codes, and where to read on.
@@ -62,6 +63,7 @@ enum Verb {
 
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
+    keep_caught_panics_quiet();
     let outcome = match Cli::try_parse() {
         Ok(cli) => run(cli.verb),
         Err(usage) => return explain(&usage),

@@ -66,7 +66,7 @@ struct SurfaceArgs {
     /// Where the mesh's texture coordinates come from
     #[arg(long, value_enum, value_name = "KIND", default_value_t = TexcoordKind::File, requires = "mesh")]
     texcoords: TexcoordKind,
-    /// Displacement map: PNG, TIFF, EXR, JPEG
+    /// Displacement map: PNG, TIFF, EXR, JPEG or another picture (docs/scene.md, Pictures)
     #[arg(long, value_name = "FILE", requires = "mesh")]
     map: Option<PathBuf>,
     /// World units from height 0 to height 1 of the map

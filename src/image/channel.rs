@@ -113,7 +113,8 @@ fn color(names: &[String], path: &Path) -> Result<Vec<usize>, ImageError> {
 }
 
 fn grey(names: &[String]) -> Option<usize> {
-    let is_color = |name: &&String| matches!(name.as_str(), "R" | "G" | "B");
+    // Beside chroma, luminance is no colour.
+    let is_color = |name: &&String| matches!(name.as_str(), "R" | "G" | "B" | "RY" | "BY");
     match names.iter().find(is_color) {
         Some(_) => None,
         None => names.iter().position(|name| name == "Y"),

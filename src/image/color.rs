@@ -9,8 +9,9 @@ use super::channel::{self, Channel};
 use super::exr_file::ExrFile;
 use super::raster::{self, Raster};
 use super::samples::{Sample as _, Samples, each_type};
+use super::source::Source;
 use super::srgb::{self, srgb_decode};
-use super::{Format, ImageError, fingerprint, format};
+use super::{Format, ImageError, fingerprint};
 use crate::surface::Wrap;
 
 /// What the numbers of an integer picture mean. Float pictures are linear whatever is said.
@@ -105,17 +106,21 @@ fn cell(s: f32, size: usize, wrap: Wrap) -> ([usize; 2], f32) {
 }
 
 /// Reads a colour picture. 8-bit sRGB pictures stay 8-bit, everything else becomes linear floats.
-pub fn load_color(path: &Path, color_space: ColorSpace) -> Result<ColorImage, ImageError> {
-    let (format, file) = format::open(path)?;
-    if format == Format::Exr {
-        let file = ExrFile::open(path, file)?;
+pub fn load_color<'a>(
+    picture: impl Into<Source<'a>>,
+    color_space: ColorSpace,
+) -> Result<ColorImage, ImageError> {
+    let input = picture.into().open()?;
+    let path = input.path;
+    if input.format == Format::Exr {
+        let file = ExrFile::open(input)?;
         let chosen = channel::select(&Channel::Luminance, &file.channels, path)?;
-        let read = file.read(&chosen)?;
+        let read = file.read_colors(&chosen)?;
         let rgb = [0, 1, 2].map(|c| &read.planes[c.min(read.planes.len() - 1)]);
         let pixels = (0..read.width * read.height).map(|i| rgb.map(|plane| plane[i]));
         return linear_image(path, read.width, read.height, pixels.collect());
     }
-    let raster = raster::decode(path, format, file)?;
+    let raster = raster::decode(input)?;
     let (width, height) = (raster.width, raster.height);
     let decode = |h: f32| match color_space {
         ColorSpace::Srgb => srgb_decode(h),

@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::color::{ColorPixels, ColorSpace, load_color};
-use super::{Format, ImageError, fingerprint, format};
+use super::source::Source;
+use super::{Format, ImageError, fingerprint};
 
 /// An equirectangular HDR picture: top row first, the top row is +Y, the middle column looks along -Z.
 #[derive(Clone)]
@@ -34,7 +35,7 @@ impl fmt::Debug for EnvironmentImage {
 /// as 0: lossy compression (EXR's DWA above all) leaves it as ringing beside bright lights, in pictures that are
 /// otherwise sound, and no light is what such a pixel stands for.
 pub fn load_environment(path: &Path) -> Result<EnvironmentImage, ImageError> {
-    let (format, _) = format::open(path)?;
+    let format = Source::File(path).open()?.format;
     if !matches!(format, Format::Exr | Format::Hdr) {
         return Err(ImageError::NotRadiance {
             path: path.to_owned(),

@@ -20,13 +20,15 @@ pub enum ImageError {
         source: io::Error,
     },
     /// Zero bytes.
-    #[error("{path} is empty; a PNG, JPEG, TIFF, EXR or Radiance HDR picture is expected")]
+    #[error("{path} is empty; a picture is expected")]
     EmptyFile {
         /// The file.
         path: PathBuf,
     },
     /// The first bytes are those of no format that is read.
-    #[error("{path} is not a PNG, JPEG, TIFF, EXR or Radiance HDR picture")]
+    #[error(
+        "{path} is not a picture that is read: PNG, JPEG, TIFF, OpenEXR, Radiance HDR, WebP, BMP, TGA, PNM and PFM are"
+    )]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -174,6 +176,14 @@ pub enum ImageError {
 }
 
 impl ImageError {
+    /// The system would not give the bytes of `path`.
+    pub(super) fn read(path: &Path, source: io::Error) -> Self {
+        Self::Read {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
     /// The decoder of `format` gave up on `path`.
     pub(super) fn decode(path: &Path, format: Format, reason: impl ToString) -> Self {
         Self::Decode {

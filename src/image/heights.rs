@@ -6,40 +6,43 @@ use super::channel::{self, Channel};
 use super::exr_file::ExrFile;
 use super::raster::{self, Raster};
 use super::samples::{NoData, Number, Sample, Samples, each_type};
-use super::{Format, ImageError, format};
+use super::source::Source;
+use super::{Format, ImageError};
 use crate::surface::{DisplacementMap, Texels, Wrap};
 
-/// Reads one channel of a PNG, JPEG, TIFF, EXR or Radiance HDR picture as a displacement map.
+/// Reads one channel of a picture as a displacement map.
 ///
 /// 8-bit pictures become [`Texels::U8`], 16-bit ones [`Texels::U16`], all others [`Texels::F32`]: larger unsigned integers
-/// as fractions of their largest, signed integers and floats as they stand. The picture's bottom row is the map's first. With
-/// [`Channel::Luminance`] the colour channels must agree: exactly for integers, to half precision (1/1024) for floats,
+/// as fractions of their largest (those of EXR as they stand), signed integers and floats as they stand. The picture's bottom row is the map's
+/// first. With [`Channel::Luminance`] the colour channels must agree: exactly for integers, to half precision (1/1024) for floats,
 /// since lossy EXR compression treats each channel for itself.
 ///
 /// A texel has no height if it is not finite or not below 1e18, or has the value that the file declares to mean "no
 /// data". It is an error, or it gets the height `nodata`, and the map is one of floats.
-pub fn load_heights(
-    path: &Path,
+pub fn load_heights<'a>(
+    picture: impl Into<Source<'a>>,
     channel: &Channel,
     wrap: Wrap,
     nodata: Option<f32>,
 ) -> Result<DisplacementMap, ImageError> {
-    let (width, height, texels) = read_texels(path, channel, nodata)?;
+    let picture = picture.into();
+    let (width, height, texels) = read_texels(picture, channel, nodata)?;
     DisplacementMap::new(width, height, texels, wrap).map_err(|source| ImageError::Map {
-        path: path.to_owned(),
+        path: picture.path().to_owned(),
         source,
     })
 }
 
 /// Width, height and heights, bottom row first.
-fn read_texels(
-    path: &Path,
+pub(super) fn read_texels(
+    picture: Source,
     channel: &Channel,
     nodata: Option<f32>,
 ) -> Result<(usize, usize, Texels), ImageError> {
-    let (format, file) = format::open(path)?;
-    if format == Format::Exr {
-        let file = ExrFile::open(path, file)?;
+    let input = picture.open()?;
+    let path = input.path;
+    if input.format == Format::Exr {
+        let file = ExrFile::open(input)?;
         let chosen = channel::select(channel, &file.channels, path)?;
         let names = chosen.iter().map(|&i| file.channels[i].clone()).collect();
         let read = file.read(&chosen)?;
@@ -55,7 +58,7 @@ fn read_texels(
             chosen.filled(heights, None, nodata)?,
         ));
     }
-    let raster = raster::decode(path, format, file)?;
+    let raster = raster::decode(input)?;
     let indices = channel::select_band(channel, &raster.channels, path)?;
     let chosen = Chosen {
         path,

@@ -1,21 +1,31 @@
 //! Reading and writing pictures. Heights keep their precision; files appear by rename when complete.
 //!
-//! Pictures are read by content, not by the file's name: PNG, JPEG, TIFF, OpenEXR, Radiance HDR. A picture in memory is
-//! bottom row first (v points up) except for the environment, whose first row is the zenith.
+//! Pictures are read by content, not by the file's name: PNG, JPEG, TIFF, OpenEXR, Radiance HDR, WebP, BMP, PNM, PFM; TGA,
+//! which has no signature, by its ending. A picture in memory is bottom row first (v points up) except for the environment,
+//! whose first row is the zenith.
 //!
-//! A file is refused from its header alone when it claims more than [`MAX_PIXELS`]: no memory is taken on the
-//! word of a few bytes.
+//! A file is refused from its header alone when it claims more than [`MAX_PIXELS`]. Below that, memory is taken as pixels
+//! are decoded, or what is claimed is held against the bytes there are: none is taken on the word of a few bytes.
 
 mod channel;
 mod color;
 mod environment;
 mod error;
+mod exr_b44;
+mod exr_blocks;
+mod exr_chroma;
+mod exr_dwa;
 mod exr_file;
 mod exr_picture;
 mod format;
+mod hdr_file;
 mod heights;
+mod jpeg_scan;
+mod png_file;
+mod pnm_file;
 mod raster;
 mod samples;
+mod source;
 mod srgb;
 mod tiff;
 mod write;
@@ -28,6 +38,7 @@ pub use exr_file::{read_exr, read_exr_header};
 pub use exr_picture::{ExrChannel, ExrPicture, ExrSamples};
 pub use format::Format;
 pub use heights::load_heights;
+pub use source::Source;
 pub use srgb::{srgb_decode, srgb_encode};
 pub use write::{write_exr, write_exr_picture, write_png_gray16, write_png_rgb8};
 

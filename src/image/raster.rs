@@ -1,15 +1,14 @@
-//! A decoded picture of interleaved samples: what PNG, JPEG, TIFF and Radiance HDR have in common.
+//! A decoded picture of interleaved samples: what all formats but OpenEXR have in common.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read, Seek};
-use std::path::Path;
+use std::io::Cursor;
 
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::error::check_size;
 use super::samples::{NoData, Samples};
-use super::tiff;
-use super::{Format, ImageError, MAX_PIXELS};
+use super::source::Input;
+use super::{Format, ImageError, MAX_PIXELS, hdr_file, jpeg_scan, png_file, pnm_file, tiff};
+use crate::files::guard::guarded;
 
 /// A decoded picture.
 pub(super) struct Raster {
@@ -50,71 +49,85 @@ pub(super) fn plane<T: Copy>(
     plane
 }
 
-/// Decodes the file of a format other than EXR.
-pub(super) fn decode(
-    path: &Path,
-    format: Format,
-    file: BufReader<File>,
-) -> Result<Raster, ImageError> {
-    match format {
-        Format::Png => decode_with(path, format, ImageFormat::Png, file),
-        Format::Hdr => decode_with(path, format, ImageFormat::Hdr, file),
-        Format::Jpeg => decode_jpeg(path, file),
-        Format::Tiff => tiff::decode(path, file),
-        Format::Exr => Err(ImageError::decode(
-            path,
-            format,
-            "EXR has no interleaved samples",
-        )),
+/// Decodes a picture of a format other than EXR.
+pub(super) fn decode(input: Input) -> Result<Raster, ImageError> {
+    let (path, format) = (input.path, input.format);
+    // The crates mean never to panic; that is too much to rely on for every damaged file.
+    guarded(|| decode_unguarded(input))
+        .unwrap_or_else(|reason| Err(ImageError::decode(path, format, reason)))
+}
+
+fn decode_unguarded(mut input: Input) -> Result<Raster, ImageError> {
+    match input.format {
+        Format::Png => png_file::decode(input),
+        Format::Jpeg => {
+            let bytes = input.read_all()?;
+            // The decoder fills the rest of a truncated picture with grey.
+            jpeg_scan::check(&bytes).map_err(|reason| input.failed(reason))?;
+            decode_with(&input, ImageFormat::Jpeg, bytes, u64::MAX)
+        }
+        Format::Tiff => tiff::decode(input.path, input.bytes),
+        Format::Hdr => hdr_file::decode(input),
+        Format::Pnm | Format::Pfm => pnm_file::decode(input),
+        Format::WebP => {
+            let bytes = input.read_all()?;
+            let most = webp_pixels(&bytes).map_err(|reason| input.failed(reason))?;
+            decode_with(&input, ImageFormat::WebP, bytes, most)
+        }
+        // Two bytes are a run of 255 pixels, in TGA of 128.
+        Format::Bmp | Format::Tga => {
+            let format = match input.format {
+                Format::Bmp => ImageFormat::Bmp,
+                _ => ImageFormat::Tga,
+            };
+            let bytes = input.read_all()?;
+            let most = 128 * bytes.len() as u64;
+            decode_with(&input, format, bytes, most)
+        }
+        Format::Exr => Err(input.failed("EXR has no interleaved samples")),
     }
 }
 
-/// The decoder fills the rest of a truncated JPEG with grey; the end marker says whether all of it is there.
-fn decode_jpeg(path: &Path, mut file: BufReader<File>) -> Result<Raster, ImageError> {
-    const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
-    const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)
-        .map_err(|source| ImageError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
-    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
-    // Coded data never holds the end marker, so one behind the last scan's start is the picture's own.
-    if last(END_OF_IMAGE) <= last(START_OF_SCAN) {
-        return Err(ImageError::decode(
-            path,
-            Format::Jpeg,
-            "the end of the file is missing",
+/// Most pixels that these bytes of a WebP file can hold, if all of its chunks are there.
+fn webp_pixels(bytes: &[u8]) -> Result<u64, String> {
+    let riff = bytes.get(4..8).and_then(|size| size.first_chunk());
+    let claimed = riff.map_or(u64::MAX, |&size| u64::from(u32::from_le_bytes(size)) + 8);
+    // Without the byte that makes chunks even.
+    if claimed > bytes.len() as u64 + 1 {
+        let there = bytes.len();
+        return Err(format!(
+            "it has {there} bytes of {claimed}; it is truncated"
         ));
     }
-    decode_with(path, Format::Jpeg, ImageFormat::Jpeg, Cursor::new(bytes))
+    let lossless = bytes.windows(4).any(|name| name == b"VP8L");
+    // A lossy block of 16 x 16 takes at least two bits for its modes; one colour without loss takes none at all.
+    Ok(match lossless {
+        true => u64::MAX,
+        false => 1024 * bytes.len() as u64,
+    })
 }
 
+/// Decodes through the `image` crate, unless the header claims more than `most_pixels`.
 fn decode_with(
-    path: &Path,
-    format: Format,
+    input: &Input,
     image_format: ImageFormat,
-    reader: impl BufRead + Seek,
+    bytes: Vec<u8>,
+    most_pixels: u64,
 ) -> Result<Raster, ImageError> {
-    let failed = |error: image::ImageError| match error {
-        image::ImageError::IoError(source)
-            if source.kind() != std::io::ErrorKind::UnexpectedEof =>
-        {
-            ImageError::Read {
-                path: path.to_owned(),
-                source,
-            }
-        }
-        other => ImageError::decode(path, format, other),
-    };
-    let mut reader = ImageReader::with_format(reader, image_format);
+    let length = bytes.len();
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), image_format);
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(16 * MAX_PIXELS); // four floats per pixel, the most there is
     reader.limits(limits);
+    let failed = |error: image::ImageError| input.failed(error);
     let decoder = reader.into_decoder().map_err(failed)?;
     let (width, height) = decoder.dimensions();
-    check_size(path, width.into(), height.into())?;
+    check_size(input.path, width.into(), height.into())?;
+    if u64::from(width) * u64::from(height) > most_pixels {
+        return Err(input.failed(format!(
+            "{length} bytes cannot hold {width}x{height} pixels"
+        )));
+    }
     let picture = DynamicImage::from_decoder(decoder).map_err(failed)?;
     let channels = channel_names(picture.color().channel_count().into());
     let samples = match picture {
@@ -122,13 +135,7 @@ fn decode_with(
         DynamicImage::ImageLumaA8(p) => Samples::U8(p.into_raw()),
         DynamicImage::ImageRgb8(p) => Samples::U8(p.into_raw()),
         DynamicImage::ImageRgba8(p) => Samples::U8(p.into_raw()),
-        DynamicImage::ImageLuma16(p) => Samples::U16(p.into_raw()),
-        DynamicImage::ImageLumaA16(p) => Samples::U16(p.into_raw()),
-        DynamicImage::ImageRgb16(p) => Samples::U16(p.into_raw()),
-        DynamicImage::ImageRgba16(p) => Samples::U16(p.into_raw()),
-        DynamicImage::ImageRgb32F(p) => Samples::F32(p.into_raw()),
-        DynamicImage::ImageRgba32F(p) => Samples::F32(p.into_raw()),
-        _ => return Err(ImageError::decode(path, format, "unknown kind of pixels")),
+        _ => return Err(input.failed("unknown kind of pixels")),
     };
     Ok(Raster {
         width: width as usize,

@@ -78,6 +78,49 @@ pub fn noise(count: usize) -> impl Iterator<Item = u32> {
     (0..count).map(|i| (i ^ 0x5bd1).wrapping_mul(0x9e37_79b1).rotate_left(i % 31))
 }
 
+/// A PNG chunk: length, name, data, checksum.
+pub fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let body = [&name[..], data].concat();
+    let crc = crc32fast::hash(&body);
+    [
+        &(data.len() as u32).to_be_bytes()[..],
+        &body,
+        &crc.to_be_bytes(),
+    ]
+    .concat()
+}
+
+/// A PNG whose rows, each led by its filter byte 0, are stored without compression.
+pub fn png(width: u32, height: u32, depth: u8, color: u8, palette: &[u8], rows: &[u8]) -> Vec<u8> {
+    let header = [
+        &width.to_be_bytes()[..],
+        &height.to_be_bytes(),
+        &[depth, color, 0, 0, 0],
+    ]
+    .concat();
+    let adler = rows.iter().fold((1u32, 0u32), |(a, b), &byte| {
+        let a = (a + u32::from(byte)) % 65521;
+        (a, (b + a) % 65521)
+    });
+    let length = rows.len() as u16;
+    let data = [
+        &[0x78, 0x01, 1][..],
+        &length.to_le_bytes(),
+        &(!length).to_le_bytes(),
+        rows,
+        &(adler.1 << 16 | adler.0).to_be_bytes(),
+    ]
+    .concat();
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    file.extend(chunk(b"IHDR", &header));
+    if !palette.is_empty() {
+        file.extend(chunk(b"PLTE", palette));
+    }
+    file.extend(chunk(b"IDAT", &data));
+    file.extend(chunk(b"IEND", &[]));
+    file
+}
+
 /// Calls `load` for the file cut at every tenth of its length: every cut must be refused.
 pub fn each_tenth<T>(path: &Path, load: impl Fn(&Path) -> Result<T, super::ImageError>) {
     let whole = std::fs::read(path).unwrap();

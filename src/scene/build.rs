@@ -207,9 +207,7 @@ impl Builder {
                 (Some(index), _) => index,
                 (None, Some(material)) => match of_file.entry(material.name.clone()) {
                     Entry::Occupied(known) => *known.get(),
-                    Entry::Vacant(new) => {
-                        *new.insert(self.file_material(path, material).map_err(asset)?)
-                    }
+                    Entry::Vacant(new) => *new.insert(self.file_material(path, material)),
                 },
                 (None, None) => self.default_material(),
             };
@@ -388,8 +386,12 @@ impl Builder {
         tables.iter().map(light).collect()
     }
 
+    /// Warns, unless the same has been said: one file may make several meshes.
     fn warn(&mut self, path: &Path, what: impl Display) {
-        self.warnings.push(format!("{}: {what}", path.display()));
+        let line = format!("{}: {what}", path.display());
+        if !self.warnings.contains(&line) {
+            self.warnings.push(line);
+        }
     }
 
     fn warn_all(&mut self, path: &Path, what: Vec<String>) {

@@ -132,20 +132,12 @@ pub enum AssetError {
     #[error(transparent)]
     Image(#[from] crate::image::ImageError),
     /// A picture inside a mesh file.
-    #[error("texture inside {}: {source}", path.display())]
+    #[error("inside {}: {source}", path.display())]
     Embedded {
         /// The mesh file.
         path: PathBuf,
         /// Why.
         source: crate::image::ImageError,
-    },
-    /// A picture inside a mesh file could not be unpacked.
-    #[error("cannot unpack the texture inside {}: {source}", path.display())]
-    Unpack {
-        /// The mesh file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
     },
     /// The triangles of a mesh file.
     #[error("{}: {part}: {source}", path.display())]

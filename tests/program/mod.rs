@@ -100,6 +100,15 @@ impl Folder {
         self.finish(shell, arguments, "")
     }
 
+    /// Runs the program here with at most so many KB of address space.
+    #[cfg(unix)]
+    pub fn run_in_memory(&self, kilobytes: u64, arguments: &[&str]) -> Output {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &format!("ulimit -v {kilobytes}; exec \"$0\" \"$@\"")]);
+        shell.arg(env!("CARGO_BIN_EXE_prismarch"));
+        self.finish(shell, arguments, "")
+    }
+
     fn finish(&self, mut program: Command, arguments: &[&str], input: &str) -> Output {
         let mut child = program
             .args(arguments)

@@ -2,7 +2,7 @@ use exr::prelude::{Compression, FlatSamples};
 use image::{GrayImage, ImageBuffer, ImageFormat, Rgb};
 
 use super::*;
-use crate::image::test_files::Folder;
+use crate::image::test_files::{Folder, each_tenth};
 
 const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror];
 
@@ -112,4 +112,38 @@ fn exr_colours_are_linear_and_finite() {
     assert_eq!(image.pixel(0, 0), Vec3::new(0.5, 4.0, 0.25));
     let error = load_color(&exr(f32::INFINITY), ColorSpace::Linear).unwrap_err();
     assert!(matches!(error, ImageError::BadPixel { x: 0, y: 0, .. }));
+}
+
+#[test]
+fn webp_bmp_and_tga_are_read() {
+    let folder = Folder::new();
+    let picture = ImageBuffer::<Rgb<u8>, _>::from_raw(2, 1, vec![1, 2, 3, 40, 50, 60]).unwrap();
+    for format in [ImageFormat::WebP, ImageFormat::Bmp, ImageFormat::Tga] {
+        let written = folder.picture(format, picture.clone());
+        let path = folder.path("picture.tga");
+        std::fs::rename(written, &path).unwrap();
+        let ColorPixels::Srgb8(pixels) = load_color(&path, ColorSpace::Srgb).unwrap().pixels else {
+            panic!("8-bit sRGB becomes something else")
+        };
+        assert_eq!(pixels, [[1, 2, 3], [40, 50, 60]], "{format:?}");
+        each_tenth(&path, |path| load_color(path, ColorSpace::Srgb));
+    }
+}
+
+#[test]
+fn a_picture_in_memory_is_read_like_a_file() {
+    let folder = Folder::new();
+    let path = folder.picture(
+        ImageFormat::Png,
+        GrayImage::from_raw(1, 1, vec![7]).unwrap(),
+    );
+    let bytes = std::fs::read(path).unwrap();
+    let name = Path::new("image 3");
+    let read = |bytes| load_color(Source::Memory { name, bytes }, ColorSpace::Srgb);
+    assert_eq!(
+        read(&bytes).unwrap().pixel(0, 0),
+        Vec3::splat(srgb_decode(7.0 / 255.0))
+    );
+    let refused = read(&bytes[..40]).unwrap_err().to_string();
+    assert!(refused.contains("image 3"), "{refused}");
 }

@@ -4,13 +4,13 @@ use image::{
 };
 
 use super::*;
-use crate::image::test_files::{Folder, each_tenth, noise};
+use crate::image::test_files::{Folder, each_tenth, noise, png};
 use crate::image::test_tiff::Tiff;
 use crate::image::{ExrChannel, write_exr, write_png_gray16};
 
 fn texels(path: &Path, channel: &str) -> Result<(usize, usize, Texels), ImageError> {
     let Ok(channel) = channel.parse();
-    read_texels(path, &channel, None)
+    read_texels(path.into(), &channel, None)
 }
 
 fn load(path: &Path) -> Result<DisplacementMap, ImageError> {
@@ -85,57 +85,6 @@ fn grey_with_alpha_reads_its_grey() {
         Texels::U8(vec![9, 8])
     );
     assert_eq!(texels(&path, "a").unwrap().2, Texels::U8(vec![255, 0]));
-}
-
-/// A PNG chunk: length, name, data, checksum.
-fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
-    let body = [&name[..], data].concat();
-    let crc = body.iter().fold(!0u32, |crc, &byte| {
-        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
-            if crc & 1 == 1 {
-                crc >> 1 ^ 0xedb8_8320
-            } else {
-                crc >> 1
-            }
-        })
-    });
-    [
-        &(data.len() as u32).to_be_bytes()[..],
-        &body,
-        &(!crc).to_be_bytes(),
-    ]
-    .concat()
-}
-
-/// A PNG whose rows, each led by its filter byte 0, are stored without compression.
-fn png(width: u32, height: u32, depth: u8, color: u8, palette: &[u8], rows: &[u8]) -> Vec<u8> {
-    let header = [
-        &width.to_be_bytes()[..],
-        &height.to_be_bytes(),
-        &[depth, color, 0, 0, 0],
-    ]
-    .concat();
-    let adler = rows.iter().fold((1u32, 0u32), |(a, b), &byte| {
-        let a = (a + u32::from(byte)) % 65521;
-        (a, (b + a) % 65521)
-    });
-    let length = rows.len() as u16;
-    let data = [
-        &[0x78, 0x01, 1][..],
-        &length.to_le_bytes(),
-        &(!length).to_le_bytes(),
-        rows,
-        &(adler.1 << 16 | adler.0).to_be_bytes(),
-    ]
-    .concat();
-    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
-    file.extend(chunk(b"IHDR", &header));
-    if !palette.is_empty() {
-        file.extend(chunk(b"PLTE", palette));
-    }
-    file.extend(chunk(b"IDAT", &data));
-    file.extend(chunk(b"IEND", &[]));
-    file
 }
 
 #[test]
@@ -217,7 +166,7 @@ fn a_texel_without_data_is_named_or_gets_a_height() {
     let folder = Folder::new();
     let no_data = |picture: Tiff, nodata| {
         let path = folder.tiff(&picture);
-        read_texels(&path, &Channel::Luminance, nodata).map(|(_, _, texels)| texels)
+        read_texels((&path).into(), &Channel::Luminance, nodata).map(|(_, _, texels)| texels)
     };
     let metres = Tiff::grey(2, 2, &[7i16, -9999, 8, 9]).with_text(42113, "-9999");
     let error = no_data(metres.clone(), None).unwrap_err();
@@ -264,7 +213,7 @@ fn what_no_texel_has_is_no_matter() {
     for declared in ["-9999", "256", "0.5", "nan", ""] {
         let picture = Tiff::grey(2, 1, &[0u8, 255]).with_text(42113, declared);
         for nodata in [None, Some(7.0)] {
-            let read = read_texels(&folder.tiff(&picture), &Channel::Luminance, nodata);
+            let read = read_texels((&folder.tiff(&picture)).into(), &Channel::Luminance, nodata);
             assert_eq!(read.unwrap().2, Texels::U8(vec![0, 255]), "{declared}");
         }
     }
@@ -283,7 +232,7 @@ fn what_is_no_height_is_told_from_heights_without_a_declaration() {
             matches!(error, ImageError::NoHeight { x: 0, y: 1, .. }),
             "{error}"
         );
-        let filled = read_texels(&path, &Channel::Luminance, Some(-2.0));
+        let filled = read_texels((&path).into(), &Channel::Luminance, Some(-2.0));
         assert_eq!(filled.unwrap().2, Texels::F32(vec![3.0, -2.0]));
     }
 }
@@ -362,14 +311,12 @@ fn exr_channels_of_layers_are_found_by_their_full_name() {
 }
 
 #[test]
-fn exr_integers_are_refused() {
+fn exr_integers_are_heights_as_they_stand() {
     let folder = Folder::new();
-    let plane = FlatSamples::U32(vec![1; 4]);
+    let plane = FlatSamples::U32(vec![0, 1, 70_000, u32::MAX]);
     let path = folder.exr((2, 2), Compression::ZIP16, vec![(None, vec![("Y", plane)])]);
-    assert!(matches!(
-        texels(&path, "luminance"),
-        Err(ImageError::UnsupportedSamples { .. })
-    ));
+    let expected = Texels::F32(vec![70_000.0, 4_294_967_296.0, 0.0, 1.0]);
+    assert_eq!(texels(&path, "luminance").unwrap(), (2, 2, expected));
 }
 
 #[test]
@@ -406,42 +353,6 @@ fn truncated_files_are_refused() {
             &folder.exr((48, 48), compression, vec![(None, channels)]),
             load,
         );
-    }
-}
-
-#[test]
-fn damaged_files_are_read_or_refused() {
-    let folder = Folder::new();
-    let size = 12;
-    let floats: Vec<f32> = noise(size * size).map(|n| n as f32).collect();
-    let gray: Vec<u8> = noise(size * size).map(|n| n as u8).collect();
-    let picture = GrayImage::from_raw(size as u32, size as u32, gray).unwrap();
-    let mut paths = Vec::new();
-    for format in [ImageFormat::Png, ImageFormat::Jpeg] {
-        let path = folder.path(format.to_mime_type().rsplit('/').next().unwrap());
-        std::fs::rename(folder.picture(format, picture.clone()), &path).unwrap();
-        paths.push(path);
-    }
-    paths.push(folder.tiff(&Tiff::grey(12, 12, &floats)));
-    for compression in LOSSLESS.into_iter().chain(LOSSY) {
-        let channels = vec![("Y", FlatSamples::F32(floats.clone()))];
-        let path = folder.path(&format!("{compression}.exr").replace(' ', ""));
-        let written = folder.exr((size, size), compression, vec![(None, channels)]);
-        std::fs::rename(written, &path).unwrap();
-        paths.push(path);
-    }
-    for path in paths {
-        let whole = std::fs::read(&path).unwrap();
-        // Headers are dense with meaning, what follows is not.
-        let places = (0..whole.len()).filter(|&at| at < 40 || at % (whole.len() / 60) == 0);
-        for at in places {
-            for damage in [0xff, 0x01] {
-                let mut bytes = whole.clone();
-                bytes[at] ^= damage;
-                std::fs::write(&path, bytes).unwrap();
-                let _: Result<_, ImageError> = load(&path);
-            }
-        }
     }
 }
 

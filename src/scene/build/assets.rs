@@ -1,6 +1,5 @@
 //! Pictures by file, each loaded once however often a scene names it.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -8,13 +7,29 @@ use glam::Vec3;
 
 use super::MapFile;
 use crate::image::{
-    self, Channel, ColorImage, ColorPixels, ColorSpace, EnvironmentImage, ImageError,
+    self, Channel, ColorImage, ColorPixels, ColorSpace, EnvironmentImage, ImageError, Source,
 };
 use crate::scene::error::AssetError;
+use crate::scene::load::FileTexture;
 use crate::surface::{DisplacementMap, Wrap};
 
+/// A picture that a scene or a mesh file names.
+#[derive(Clone, Copy)]
+pub(super) enum Picture<'a> {
+    File(&'a Path),
+    /// Inside of the mesh file `mesh`.
+    Embedded {
+        mesh: &'a Path,
+        name: &'a str,
+        bytes: &'a [u8],
+    },
+}
+
+/// Tells pictures apart: the file, and which of those inside of it.
+type PictureKey = (PathBuf, Option<String>);
+
 /// A channel of a picture, and how it goes on outside.
-type ChannelKey = (PathBuf, Channel, Wrap);
+type ChannelKey = (PictureKey, Channel, Wrap);
 
 /// A displacement map, and the height of texels without data.
 type HeightsKey = (PathBuf, Channel, Wrap, Option<f32>);
@@ -24,8 +39,46 @@ type HeightsKey = (PathBuf, Channel, Wrap, Option<f32>);
 pub(super) struct Assets {
     heights: Vec<(HeightsKey, Arc<DisplacementMap>)>,
     scalars: Vec<(ChannelKey, Arc<DisplacementMap>)>,
-    colors: Vec<((PathBuf, ColorSpace, Vec3), Arc<ColorImage>)>,
+    colors: Vec<((PictureKey, ColorSpace, Vec3), Arc<ColorImage>)>,
     environments: Vec<(PathBuf, Arc<EnvironmentImage>)>,
+    stand_in: Option<Arc<ColorImage>>,
+}
+
+impl<'a> Picture<'a> {
+    /// The picture of a texture of the file `mesh`.
+    pub fn of(mesh: &'a Path, texture: &'a FileTexture) -> Self {
+        match texture {
+            FileTexture::Path(path) => Self::File(path),
+            FileTexture::Embedded { name, bytes } => Self::Embedded { mesh, name, bytes },
+        }
+    }
+
+    fn key(self) -> PictureKey {
+        match self {
+            Self::File(path) => (identity(path), None),
+            Self::Embedded { mesh, name, .. } => (identity(mesh), Some(name.to_owned())),
+        }
+    }
+
+    fn source(self) -> Source<'a> {
+        match self {
+            Self::File(path) => Source::File(path),
+            Self::Embedded { name, bytes, .. } => Source::Memory {
+                name: Path::new(name),
+                bytes,
+            },
+        }
+    }
+
+    fn refused(self, source: ImageError) -> AssetError {
+        match self {
+            Self::File(_) => AssetError::Image(source),
+            Self::Embedded { mesh, .. } => AssetError::Embedded {
+                path: mesh.to_owned(),
+                source,
+            },
+        }
+    }
 }
 
 impl Assets {
@@ -39,41 +92,61 @@ impl Assets {
     ) -> Result<Arc<DisplacementMap>, AssetError> {
         let key = (identity(path), channel.clone(), wrap, nodata);
         once(&mut self.heights, key, || {
-            image::load_heights(path, channel, wrap, nodata)
+            Ok(image::load_heights(path, channel, wrap, nodata)?)
         })
     }
 
     /// A channel of a picture as a parameter of a material; apart from the heights, which are reported and edited.
     pub fn scalar(
         &mut self,
-        path: &Path,
+        picture: Picture,
         channel: &Channel,
         wrap: Wrap,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
-        let key = (identity(path), channel.clone(), wrap);
-        once(&mut self.scalars, key, || {
-            image::load_heights(path, channel, wrap, None)
-        })
+        once(
+            &mut self.scalars,
+            (picture.key(), channel.clone(), wrap),
+            || {
+                image::load_heights(picture.source(), channel, wrap, None)
+                    .map_err(|e| picture.refused(e))
+            },
+        )
     }
 
     /// A colour picture, times `tint`.
     pub fn color(
         &mut self,
-        path: &Path,
+        picture: Picture,
         space: ColorSpace,
         tint: Vec3,
     ) -> Result<Arc<ColorImage>, AssetError> {
-        let key = (identity(path), space, tint);
-        once(&mut self.colors, key, || {
-            Ok(tinted(image::load_color(path, space)?, tint))
+        once(&mut self.colors, (picture.key(), space, tint), || {
+            let image = image::load_color(picture.source(), space);
+            Ok(tinted(image.map_err(|e| picture.refused(e))?, tint))
         })
     }
 
     /// An equirectangular light.
     pub fn environment(&mut self, path: &Path) -> Result<Arc<EnvironmentImage>, AssetError> {
         once(&mut self.environments, identity(path), || {
-            image::load_environment(path)
+            Ok(image::load_environment(path)?)
         })
+    }
+
+    /// What is shown for a colour picture that cannot be read: no one takes it for the real one.
+    pub fn stand_in(&mut self) -> Arc<ColorImage> {
+        let checker = || {
+            let color = |i: usize| match (i % 8 + i / 8) % 2 {
+                0 => [255, 0, 255],
+                _ => [0, 0, 0],
+            };
+            Arc::new(ColorImage {
+                width: 8,
+                height: 8,
+                pixels: ColorPixels::Srgb8((0..64).map(color).collect()),
+            })
+        };
+        self.stand_in.get_or_insert_with(checker).clone()
     }
 
     /// The displacement maps, in the order of their first use.
@@ -88,7 +161,7 @@ impl Assets {
 fn once<K: PartialEq, T>(
     known: &mut Vec<(K, Arc<T>)>,
     key: K,
-    load: impl FnOnce() -> Result<T, ImageError>,
+    load: impl FnOnce() -> Result<T, AssetError>,
 ) -> Result<Arc<T>, AssetError> {
     if let Some((_, asset)) = known.iter().find(|(k, _)| *k == key) {
         return Ok(asset.clone());
@@ -101,50 +174,6 @@ fn once<K: PartialEq, T>(
 /// The same for every way to write a path; the path as it is where the file does not exist.
 fn identity(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
-}
-
-/// The picture that the mesh file at `path` holds, times `tint`.
-pub(super) fn embedded_color(
-    path: &Path,
-    bytes: &[u8],
-    space: ColorSpace,
-    tint: Vec3,
-) -> Result<Arc<ColorImage>, AssetError> {
-    let image = unpacked(path, bytes, |file| image::load_color(file, space))?;
-    Ok(Arc::new(tinted(image, tint)))
-}
-
-/// A channel of the picture that the mesh file at `path` holds.
-pub(super) fn embedded_scalar(
-    path: &Path,
-    bytes: &[u8],
-    channel: &Channel,
-    wrap: Wrap,
-) -> Result<Arc<DisplacementMap>, AssetError> {
-    unpacked(path, bytes, |file| {
-        image::load_heights(file, channel, wrap, None)
-    })
-    .map(Arc::new)
-}
-
-/// What `load` makes of a picture that the mesh file at `path` holds: its readers want a file.
-fn unpacked<T>(
-    path: &Path,
-    bytes: &[u8],
-    load: impl FnOnce(&Path) -> Result<T, ImageError>,
-) -> Result<T, AssetError> {
-    let unpacked = tempfile::NamedTempFile::new().and_then(|mut file| {
-        file.write_all(bytes)?;
-        Ok(file)
-    });
-    let unpacked = unpacked.map_err(|source| AssetError::Unpack {
-        path: path.to_owned(),
-        source,
-    })?;
-    load(unpacked.path()).map_err(|source| AssetError::Embedded {
-        path: path.to_owned(),
-        source,
-    })
 }
 
 fn tinted(image: ColorImage, tint: Vec3) -> ColorImage {

@@ -1,19 +1,21 @@
 //! Materials of scene and mesh files: their textures loaded.
+//!
+//! A picture that the scene file names and that cannot be read is an error. One that a mesh file names, which someone else
+//! wrote for another machine, is a warning: a checker stands for a colour, the factor alone for a number.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use glam::Vec3;
 
 use super::Builder;
-use super::assets;
-use crate::image::{Channel, ColorSpace};
+use super::assets::Picture;
+use crate::image::{Channel, ColorSpace, ImageError};
 use crate::scene::error::{AssetError, SceneError};
 use crate::scene::file::{
     ColorTable, DetailTable, MaterialTable, ScalarTable, ScalarTextureTable, TextureTable,
 };
-use crate::scene::load::{
-    FileColor, FileDetail, FileMaterial, FileScalar, FileTexture, FileTextureUse,
-};
+use crate::scene::load::{FileColor, FileDetail, FileMaterial, FileScalar, FileTextureUse};
 use crate::scene::{Color, Coordinates, Detail, Material, Scalar, ScalarTexture, Texture};
 
 impl Builder {
@@ -66,9 +68,11 @@ impl Builder {
     }
 
     fn texture(&mut self, table: &TextureTable) -> Result<Texture, SceneError> {
-        let loaded = self
-            .assets
-            .color(&table.file.value, table.color_space, Vec3::ONE);
+        let loaded = self.assets.color(
+            Picture::File(&table.file.value),
+            table.color_space,
+            Vec3::ONE,
+        );
         Ok(Texture {
             image: loaded.map_err(|e| table.file.asset(e))?,
             wrap: table.wrap,
@@ -78,9 +82,9 @@ impl Builder {
     }
 
     fn scalar_texture(&mut self, table: &ScalarTextureTable) -> Result<ScalarTexture, SceneError> {
-        let loaded = self
-            .assets
-            .scalar(&table.file.value, &table.channel, table.wrap);
+        let loaded =
+            self.assets
+                .scalar(Picture::File(&table.file.value), &table.channel, table.wrap);
         Ok(ScalarTexture {
             map: loaded.map_err(|e| table.file.asset(e))?,
             uv: table.uv,
@@ -89,31 +93,32 @@ impl Builder {
     }
 
     /// Adds a material that the mesh file at `path` gives.
-    pub(super) fn file_material(
-        &mut self,
-        path: &Path,
-        file: FileMaterial,
-    ) -> Result<usize, AssetError> {
-        let mut color = |color: &FileColor| self.file_color(path, color);
+    pub(super) fn file_material(&mut self, path: &Path, file: FileMaterial) -> usize {
+        let mut of_file = OfFile {
+            builder: self,
+            path,
+            material: &file.name,
+        };
+        let mut color = |key, color: &FileColor| of_file.color(key, color);
         let (base_color, sheen_color, emission) = (
-            color(&file.base_color)?,
-            color(&file.sheen_color)?,
-            color(&file.emission)?,
+            color("base_color", &file.base_color),
+            color("sheen_color", &file.sheen_color),
+            color("emission", &file.emission),
         );
-        let mut scalar = |scalar: &FileScalar| self.file_scalar(path, scalar);
+        let mut scalar = |key, scalar: &FileScalar| of_file.scalar(key, scalar);
         let material = Material {
             name: file.name.clone(),
             base_color,
             sheen_color,
             emission,
-            metallic: scalar(&file.metallic)?,
-            roughness: scalar(&file.roughness)?,
-            specular: scalar(&file.specular)?,
-            transmission: scalar(&file.transmission)?,
-            coat: scalar(&file.coat)?,
-            coat_roughness: scalar(&file.coat_roughness)?,
-            sheen_roughness: scalar(&file.sheen_roughness)?,
-            opacity: scalar(&file.opacity)?,
+            metallic: scalar("metallic", &file.metallic),
+            roughness: scalar("roughness", &file.roughness),
+            specular: scalar("specular", &file.specular),
+            transmission: scalar("transmission", &file.transmission),
+            coat: scalar("coat", &file.coat),
+            coat_roughness: scalar("coat_roughness", &file.coat_roughness),
+            sheen_roughness: scalar("sheen_roughness", &file.sheen_roughness),
+            opacity: scalar("opacity", &file.opacity),
             opacity_cutoff: file.opacity_cutoff,
             ior: file.ior,
             attenuation_color: file.attenuation_color,
@@ -122,60 +127,103 @@ impl Builder {
             priority: 0,
             detail: None,
         };
-        let detail = match &file.detail {
-            Some(FileDetail::NormalMap { texture, strength }) => Some(Detail::NormalMap {
-                texture: self.file_texture(path, texture, ColorSpace::Linear, Vec3::ONE)?,
-                strength: *strength,
-            }),
-            None => None,
-        };
+        let detail = file
+            .detail
+            .as_ref()
+            .and_then(|detail| of_file.detail(detail));
         self.materials.push(Material { detail, ..material });
-        Ok(self.materials.len() - 1)
+        self.materials.len() - 1
+    }
+}
+
+/// Reads the pictures of a mesh file's material.
+struct OfFile<'a> {
+    builder: &'a mut Builder,
+    path: &'a Path,
+    material: &'a str,
+}
+
+impl OfFile<'_> {
+    fn color(&mut self, key: &str, color: &FileColor) -> Color {
+        let Some(texture) = &color.texture else {
+            return Color::Constant(color.factor);
+        };
+        let loaded = self.texture(texture, ColorSpace::Srgb, color.factor);
+        Color::Texture(loaded.unwrap_or_else(|error| {
+            self.warn(key, &error, "a checker of magenta and black is shown");
+            Texture {
+                image: self.builder.assets.stand_in(),
+                wrap: texture.wrap,
+                uv: texture.uv,
+                coordinates: Coordinates::Uv,
+            }
+        }))
     }
 
-    fn file_color(&mut self, path: &Path, color: &FileColor) -> Result<Color, AssetError> {
-        match &color.texture {
-            Some(texture) => self
-                .file_texture(path, texture, ColorSpace::Srgb, color.factor)
-                .map(Color::Texture),
-            None => Ok(Color::Constant(color.factor)),
+    fn scalar(&mut self, key: &str, scalar: &FileScalar) -> Scalar {
+        let Some((texture, channel)) = &scalar.texture else {
+            return Scalar::Constant(scalar.factor);
+        };
+        let Ok(channel): Result<Channel, _> = channel.parse();
+        let picture = Picture::of(self.path, &texture.source);
+        let assets = &mut self.builder.assets;
+        match assets.scalar(picture, &channel, texture.wrap) {
+            Ok(map) => Scalar::Texture(ScalarTexture {
+                map,
+                uv: texture.uv,
+                factor: scalar.factor,
+            }),
+            // The alpha of a picture that has none is 1.
+            Err(error) if channel == Channel::A && is_missing_channel(&error) => {
+                Scalar::Constant(scalar.factor)
+            }
+            Err(error) => {
+                let factor = scalar.factor;
+                self.warn(key, &error, format_args!("{factor} is taken"));
+                Scalar::Constant(factor)
+            }
         }
     }
 
-    fn file_texture(
+    fn detail(&mut self, detail: &FileDetail) -> Option<Detail> {
+        let FileDetail::NormalMap { texture, strength } = detail;
+        match self.texture(texture, ColorSpace::Linear, Vec3::ONE) {
+            Ok(texture) => Some(Detail::NormalMap {
+                texture,
+                strength: *strength,
+            }),
+            Err(error) => {
+                self.warn("normal_map", &error, "normals are left as they are");
+                None
+            }
+        }
+    }
+
+    fn texture(
         &mut self,
-        path: &Path,
         texture: &FileTextureUse,
         space: ColorSpace,
         factor: Vec3,
     ) -> Result<Texture, AssetError> {
+        let picture = Picture::of(self.path, &texture.source);
         Ok(Texture {
-            image: match &texture.source {
-                FileTexture::Path(picture) => self.assets.color(picture, space, factor)?,
-                FileTexture::Embedded(bytes) => assets::embedded_color(path, bytes, space, factor)?,
-            },
+            image: self.builder.assets.color(picture, space, factor)?,
             wrap: texture.wrap,
             uv: texture.uv,
             coordinates: Coordinates::Uv,
         })
     }
 
-    fn file_scalar(&mut self, path: &Path, scalar: &FileScalar) -> Result<Scalar, AssetError> {
-        let Some((texture, channel)) = &scalar.texture else {
-            return Ok(Scalar::Constant(scalar.factor));
-        };
-        let Ok(channel): Result<Channel, _> = channel.parse();
-        Ok(Scalar::Texture(ScalarTexture {
-            map: match &texture.source {
-                FileTexture::Path(picture) => {
-                    self.assets.scalar(picture, &channel, texture.wrap)?
-                }
-                FileTexture::Embedded(bytes) => {
-                    assets::embedded_scalar(path, bytes, &channel, texture.wrap)?
-                }
-            },
-            uv: texture.uv,
-            factor: scalar.factor,
-        }))
+    fn warn(&mut self, key: &str, error: &AssetError, instead: impl Display) {
+        let material = self.material;
+        let what = format!("material {material:?}: {key}: {error}; {instead}");
+        self.builder.warn(self.path, what);
     }
+}
+
+fn is_missing_channel(error: &AssetError) -> bool {
+    let (AssetError::Image(source) | AssetError::Embedded { source, .. }) = error else {
+        return false;
+    };
+    matches!(source, ImageError::NoSuchChannel { .. })
 }

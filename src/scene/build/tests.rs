@@ -284,6 +284,114 @@ fn missing_and_broken_pictures_are_named_where_they_are_asked_for() {
 }
 
 #[test]
+fn pictures_that_a_mesh_file_names_in_vain_are_marked_and_warned_of_once() {
+    let folder = folder();
+    let mtl = "newmtl rough\nKd 0.5 1 1\nmap_Kd none.png\nPr 0.25\nmap_Pr two.obj\nnorm none.png\nnewmtl smooth\nKd 1 1 1\n";
+    fs::write(folder.path().join("two.mtl"), mtl).unwrap();
+    let mesh = "[[mesh]]\nfile = \"two.obj\"\n";
+    let loaded = load(&folder, &format!("{mesh}{mesh}")).unwrap();
+    let material = &loaded.scene.materials[0];
+    let Color::Texture(checker) = &material.base_color else {
+        panic!("the picture has a stand-in");
+    };
+    let [first, second] = [0, 1].map(|x| checker.image.pixel(x, 0));
+    assert_eq!([first, second], [Vec3::new(1.0, 0.0, 1.0), Vec3::ZERO]);
+    assert!(matches!(material.roughness, Scalar::Constant(0.25)));
+    assert!(material.detail.is_none());
+    assert_eq!(loaded.warnings.len(), 3, "{:?}", loaded.warnings);
+    for (picture, key) in [
+        ("none.png", "base_color"),
+        ("two.obj", "roughness"),
+        ("none.png", "normal_map"),
+    ] {
+        let named = |line: &&String| {
+            ["two.obj: ", "\"rough\"", key, picture]
+                .iter()
+                .all(|word| line.contains(word))
+        };
+        assert!(
+            loaded.warnings.iter().any(|line| named(&line)),
+            "{key}: {:?}",
+            loaded.warnings
+        );
+    }
+}
+
+#[test]
+fn a_displacement_map_must_be_there_whoever_names_it() {
+    let folder = folder();
+    let displaced = "[[mesh]]\nfile = \"two.obj\"\n[mesh.displacement]\nscale = 1\n";
+    fs::remove_file(folder.path().join("height.png")).unwrap();
+    let message = load(&folder, displaced).unwrap_err().to_string();
+    assert!(message.contains("height.png"), "{message}");
+}
+
+/// A triangle whose material reads its colour and its mask from a picture that the file holds.
+fn masked(folder: &TempDir, picture: &str) -> Result<Loaded, SceneError> {
+    let bytes = fs::read(folder.path().join(picture)).unwrap();
+    let floats = |values: &[f32]| {
+        values
+            .iter()
+            .flat_map(|x| x.to_le_bytes())
+            .collect::<Vec<u8>>()
+    };
+    let positions = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let texcoords = floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    let view = |offset: usize, length: usize| serde_json::json!({ "buffer": 0, "byteOffset": offset, "byteLength": length });
+    let accessor = |view: u32, kind: &str| serde_json::json!({ "bufferView": view, "componentType": 5126, "count": 3, "type": kind, "min": [0, 0, 0], "max": [1, 1, 0] });
+    let mut document = serde_json::json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "material": 0 }] }],
+        "materials": [{ "name": "leaf", "alphaMode": "MASK", "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }],
+        "textures": [{ "source": 0 }], "images": [{ "bufferView": 2, "mimeType": "image/png", "name": "veins" }],
+        "accessors": [accessor(0, "VEC3"), accessor(1, "VEC2")],
+        "bufferViews": [view(0, 36), view(36, 24), view(60, bytes.len())],
+        "buffers": [{ "byteLength": 60 + bytes.len(), "uri": "leaf.bin" }],
+    });
+    for bound in ["min", "max"] {
+        document["accessors"][1]
+            .as_object_mut()
+            .unwrap()
+            .remove(bound);
+    }
+    fs::write(folder.path().join("leaf.gltf"), document.to_string()).unwrap();
+    fs::write(
+        folder.path().join("leaf.bin"),
+        [positions, texcoords, bytes].concat(),
+    )
+    .unwrap();
+    load(folder, "[[mesh]]\nfile = \"leaf.gltf\"\n")
+}
+
+#[test]
+fn the_alpha_of_a_picture_without_is_one() {
+    let folder = folder();
+    let loaded = masked(&folder, "color.png").unwrap();
+    let material = &loaded.scene.materials[0];
+    assert!(matches!(material.base_color, Color::Texture(_)));
+    assert!(matches!(material.opacity, Scalar::Constant(1.0)));
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+}
+
+#[test]
+fn a_broken_picture_inside_of_a_mesh_file_is_named() {
+    let folder = folder();
+    let whole = fs::read(folder.path().join("color.png")).unwrap();
+    fs::write(folder.path().join("cut.png"), &whole[..whole.len() - 20]).unwrap();
+    let loaded = masked(&folder, "cut.png").unwrap();
+    let warnings = loaded.warnings.join("\n");
+    for word in [
+        "leaf.gltf",
+        "\"leaf\"",
+        "base_color",
+        "image 0 \"veins\"",
+        "PNG",
+    ] {
+        assert!(warnings.contains(word), "{word}: {warnings}");
+    }
+}
+
+#[test]
 fn an_environment_with_a_nan_is_refused_at_its_light() {
     let folder = folder();
     let pixel = |x: usize, _| (x as f32, 1.0, if x == 1 { f32::NAN } else { 0.0 });

@@ -1,6 +1,7 @@
 //! What a mesh file says of a material, whatever its format.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -128,8 +129,13 @@ pub struct FileTextureUse {
 pub enum FileTexture {
     /// A picture file; not checked to exist.
     Path(PathBuf),
-    /// The bytes of a PNG or JPEG file that the mesh file holds.
-    Embedded(Vec<u8>),
+    /// A picture that the mesh file holds.
+    Embedded {
+        /// What messages call it, different from the file's others.
+        name: String,
+        /// The bytes of a picture file.
+        bytes: Arc<[u8]>,
+    },
 }
 
 /// Detail finer than the mesh.

@@ -170,16 +170,21 @@ impl Reader<'_> {
 
     fn image(&self, index: usize) -> Option<FileTexture> {
         let image = self.document.as_json().images.get(index)?;
+        let embedded = |bytes: &[u8]| FileTexture::Embedded {
+            name: match &image.name {
+                Some(name) => format!("image {index} {name:?}"),
+                None => format!("image {index}"),
+            },
+            bytes: bytes.into(),
+        };
         if let Some(uri) = &image.uri {
             return match uri.strip_prefix("data:") {
-                Some(data) => Some(FileTexture::Embedded(base64(
-                    data.split_once(";base64,")?.1,
-                )?)),
+                Some(data) => Some(embedded(&base64(data.split_once(";base64,")?.1)?)),
                 None => Some(FileTexture::Path(beside(self.path, &percent_decoded(uri)))),
             };
         }
         let bytes = view_bytes(self.document, image.buffer_view?.value(), self.buffers)?;
-        Some(FileTexture::Embedded(bytes.to_vec()))
+        Some(embedded(bytes))
     }
 }
 

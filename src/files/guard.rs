@@ -1,0 +1,43 @@
+//! Decoders of other houses: where one panics on a damaged file, that is a reason to refuse the file.
+
+use std::cell::Cell;
+use std::panic::{self, AssertUnwindSafe, catch_unwind};
+
+thread_local! {
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What `decode` gives, in this thread. What it has changed when it panics must not be used any more.
+///
+/// # Errors
+///
+/// A sentence for the user, where it panics.
+pub fn guarded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
+    let before = GUARDED.replace(true);
+    let decoded = catch_unwind(AssertUnwindSafe(decode));
+    GUARDED.set(before);
+    decoded.map_err(|_| "the decoder stumbled over it; is it damaged?".to_owned())
+}
+
+/// For programs: panics that [`guarded`] catches leave no trace on the standard error stream, all others do as before.
+pub fn keep_caught_panics_quiet() {
+    let usual = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        if !GUARDED.get() {
+            usual(info);
+        }
+    }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_a_reason() {
+        assert_eq!(guarded(|| 3), Ok(3));
+        let hollow: Result<(), String> = guarded(|| panic!("inside a test"));
+        assert!(hollow.unwrap_err().contains("stumbled"));
+        assert!(!GUARDED.get());
+    }
+}
