@@ -139,6 +139,14 @@ pub enum AssetError {
         /// Why.
         source: crate::image::ImageError,
     },
+    /// A picture that a statement of a mesh file, or of its material library, names.
+    #[error("{from}: {source}")]
+    Named {
+        /// The statement.
+        from: String,
+        /// Why.
+        source: Box<AssetError>,
+    },
     /// A picture inside a mesh file could not be unpacked.
     #[error("cannot unpack the texture inside {}: {source}", path.display())]
     Unpack {
@@ -165,4 +173,14 @@ pub enum AssetError {
         /// Why.
         source: crate::surface::SurfaceError,
     },
+}
+
+impl AssetError {
+    /// The same, with the statement that names the file.
+    pub(super) fn named_by(self, from: &str) -> Self {
+        Self::Named {
+            from: from.to_owned(),
+            source: Box::new(self),
+        }
+    }
 }

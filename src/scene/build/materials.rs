@@ -127,6 +127,10 @@ impl Builder {
                 texture: self.file_texture(path, texture, ColorSpace::Linear, Vec3::ONE)?,
                 strength: *strength,
             }),
+            Some(FileDetail::Bump(heights)) => match self.file_scalar(path, heights)? {
+                Scalar::Texture(heights) => Some(Detail::Bump(heights)),
+                Scalar::Constant(_) => None,
+            },
             None => None,
         };
         self.materials.push(Material { detail, ..material });
