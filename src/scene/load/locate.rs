@@ -9,7 +9,8 @@ use super::text;
 /// Looks for named files, and remembers the folders it has looked into.
 #[derive(Default)]
 pub(super) struct Locator {
-    folders: HashMap<PathBuf, Vec<OsString>>,
+    /// Per folder the names in it by their lower case.
+    folders: HashMap<PathBuf, HashMap<String, OsString>>,
 }
 
 /// What a name stands for.
@@ -74,28 +75,24 @@ impl Locator {
                 path = next;
                 continue;
             }
-            let wanted = part.to_lowercase();
-            let entries = self.entries(&path);
-            let alike = entries
-                .iter()
-                .find(|e| e.to_string_lossy().to_lowercase() == wanted);
+            let alike = self.entries(&path).get(&part.to_lowercase());
             path.push(alike?);
         }
         is_there(&path).then_some(path)
     }
 
-    /// The names in a folder, sorted, so that all systems choose alike; none if it cannot be read.
-    fn entries(&mut self, folder: &Path) -> &[OsString] {
+    /// None if the folder cannot be read; of names that are alike the first in order, so that all systems choose alike.
+    fn entries(&mut self, folder: &Path) -> &HashMap<String, OsString> {
         self.folders.entry(folder.to_owned()).or_insert_with(|| {
-            let here = if folder.as_os_str().is_empty() {
-                Path::new(".")
-            } else {
-                folder
-            };
-            let entries = std::fs::read_dir(here).into_iter().flatten().flatten();
+            let unnamed = folder.as_os_str().is_empty();
+            let folder = if unnamed { Path::new(".") } else { folder };
+            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
             let mut names: Vec<_> = entries.map(|entry| entry.file_name()).collect();
-            names.sort();
+            names.sort_unstable_by(|a, b| b.cmp(a));
             names
+                .into_iter()
+                .map(|name| (name.to_string_lossy().to_lowercase(), name))
+                .collect()
         })
     }
 }

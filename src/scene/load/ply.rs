@@ -261,13 +261,17 @@ impl Faces {
                 });
             }
             let textured = own_texcoords && !face.texcoords.is_empty();
-            let texcoords = face.texcoords.as_chunks().0.iter().map(|&st| st.into());
+            let texcoords = face
+                .texcoords
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&st| Vec2::from_array(st));
             if count < 3 {
                 self.too_few += 1;
                 continue;
             }
-            self.texcoords
-                .extend(texcoords.map(|st: [f32; 2]| Vec2::from(st)));
+            self.texcoords.extend(texcoords);
             for index in face.corners {
                 self.push_corner(index, &element.name, number)?;
             }

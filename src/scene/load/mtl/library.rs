@@ -56,13 +56,16 @@ impl<'a> Libraries<'a> {
 
     /// `names` is one file whose name may hold spaces, or several files.
     pub(in super::super) fn open(&mut self, names: &[u8]) {
-        let whole = text::unquoted(names);
-        let several: Vec<_> = match self.locator.locate(self.obj, whole).exists {
-            true => vec![whole],
-            false => text::words(names).map(text::unquoted).collect(),
+        let whole = self.locator.locate(self.obj, text::unquoted(names));
+        let words: Vec<_> = text::words(names).collect();
+        let located = match &words[..] {
+            [_, _, ..] if !whole.exists => words
+                .into_iter()
+                .map(|name| self.locator.locate(self.obj, text::unquoted(name)))
+                .collect(),
+            _ => vec![whole],
         };
-        for name in several {
-            let located = self.locator.locate(self.obj, name);
+        for located in located {
             self.warnings.extend(located.note);
             if let Err(e) = self.read(&located.path) {
                 let shown = located.path.display();
