@@ -203,7 +203,11 @@ impl Builder {
                 .base_mesh(path, &name, part.mesh, &shaping)
                 .map_err(asset)?;
             let by_file = part.material.as_ref().and_then(|m| m.displacement.clone());
-            let material = match (named, part.material) {
+            let displaces = table.displacement.as_ref().is_some_and(|d| d.map.is_none());
+            let of_part = part
+                .material
+                .map(|m| if displaces { m.displaced() } else { m });
+            let material = match (named, of_part) {
                 (Some(index), _) => index,
                 (None, Some(material)) => match of_file.entry(material.name.clone()) {
                     Entry::Occupied(known) => *known.get(),
@@ -314,7 +318,10 @@ impl Builder {
         let map = self
             .assets
             .heights(path, &channel, wrap.unwrap_or_default(), table.nodata)
-            .map_err(|e| at.asset(e))?;
+            .map_err(|e| match by_file {
+                Some(map) => at.asset(e.named_by(&map.from)),
+                None => at.asset(e),
+            })?;
         displaced(name, mesh, (path, &map), displacement).map_err(|e| match e {
             AssetError::Heights { .. } => at.asset(e),
             _ => file.asset(e),

@@ -139,6 +139,14 @@ pub enum AssetError {
         /// Why.
         source: crate::image::ImageError,
     },
+    /// A picture that a statement of a mesh file, or of its material library, names.
+    #[error("{from}: {source}")]
+    Named {
+        /// The statement.
+        from: String,
+        /// Why.
+        source: Box<AssetError>,
+    },
     /// The triangles of a mesh file.
     #[error("{}: {part}: {source}", path.display())]
     Geometry {
@@ -198,4 +206,14 @@ pub enum UntraceableError {
         /// The largest coordinate, of either sign.
         reach: f32,
     },
+}
+
+impl AssetError {
+    /// The same, with the statement that names the file.
+    pub(super) fn named_by(self, from: &str) -> Self {
+        Self::Named {
+            from: from.to_owned(),
+            source: Box::new(self),
+        }
+    }
 }

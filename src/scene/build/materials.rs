@@ -186,16 +186,23 @@ impl OfFile<'_> {
     }
 
     fn detail(&mut self, detail: &FileDetail) -> Option<Detail> {
-        let FileDetail::NormalMap { texture, strength } = detail;
-        match self.texture(texture, ColorSpace::Linear, Vec3::ONE) {
-            Ok(texture) => Some(Detail::NormalMap {
-                texture,
-                strength: *strength,
-            }),
-            Err(error) => {
-                self.warn("normal_map", &error, "normals are left as they are");
-                None
+        match detail {
+            FileDetail::NormalMap { texture, strength } => {
+                match self.texture(texture, ColorSpace::Linear, Vec3::ONE) {
+                    Ok(texture) => Some(Detail::NormalMap {
+                        texture,
+                        strength: *strength,
+                    }),
+                    Err(error) => {
+                        self.warn("normal_map", &error, "normals are left as they are");
+                        None
+                    }
+                }
             }
+            FileDetail::Bump(heights) => match self.scalar("bump", heights) {
+                Scalar::Texture(heights) => Some(Detail::Bump(heights)),
+                Scalar::Constant(_) => None,
+            },
         }
     }
 

@@ -465,3 +465,34 @@ fn corners_that_differ_by_rounding_are_joined_and_told() {
         "{refusal}"
     );
 }
+
+#[test]
+fn a_bump_map_of_a_mesh_file_shades_where_it_does_not_displace() {
+    let folder = folder();
+    let library = "newmtl rough\nmap_Bump height.png -bm 0.25\nnewmtl smooth\nKd 1 1 1\n";
+    fs::write(folder.path().join("two.mtl"), library).unwrap();
+    let plain = "[[mesh]]\nfile = \"two.obj\"\n";
+    let own =
+        format!("{plain}[mesh.displacement]\nscale = 1\nmap = \"color.png\"\nchannel = \"r\"\n");
+    for scene in [plain, &own] {
+        let loaded = load(&folder, scene).unwrap().scene;
+        let material = &loaded.materials[loaded.objects[0].material];
+        match &material.detail {
+            Some(Detail::Bump(heights)) => assert_eq!(heights.factor, 0.25),
+            other => panic!("{other:?}"),
+        }
+    }
+    // The other material names no map, so only the first part is asked for.
+    let obj = OBJ.replace("usemtl smooth", "usemtl rough");
+    fs::write(folder.path().join("two.obj"), obj).unwrap();
+    let displaced = format!("{plain}[mesh.displacement]\n");
+    let loaded = load(&folder, &displaced).unwrap().scene;
+    assert!(loaded.materials.iter().all(|m| m.detail.is_none()));
+    assert_eq!(surface(&loaded.objects[0]).range(), (0.0, 0.25));
+    fs::remove_file(folder.path().join("height.png")).unwrap();
+    let error = load(&folder, &displaced).unwrap_err().to_string();
+    assert!(
+        error.contains("map_Bump of material \"rough\" in two.mtl"),
+        "{error}"
+    );
+}

@@ -42,10 +42,24 @@ pub struct FileMaterial {
     pub opacity: FileScalar,
     /// If given, below it there is a hole and from it on there is none.
     pub opacity_cutoff: Option<f32>,
-    /// A normal map.
+    /// A normal map or a bump map.
     pub detail: Option<FileDetail>,
     /// The displacement map, where the format knows one (MTL).
     pub displacement: Option<FileDisplacement>,
+}
+
+impl FileMaterial {
+    /// For a surface that its displacement map displaces: the same picture must not shade as a bump map once more.
+    #[must_use]
+    pub fn displaced(mut self) -> Self {
+        if let (Some(FileDetail::Bump(heights)), Some(map)) = (&self.detail, &self.displacement)
+            && let Some((texture, _)) = &heights.texture
+            && texture.source == FileTexture::Path(map.path.clone())
+        {
+            self.detail = None;
+        }
+        self
+    }
 }
 
 impl Default for FileMaterial {
@@ -122,6 +136,8 @@ pub struct FileTextureUse {
     pub wrap: Wrap,
     /// Of texture coordinates with v up.
     pub uv: UvTransform,
+    /// What names it, for messages: `map_Kd of material "rock" in rock.mtl`.
+    pub from: String,
 }
 
 /// A texture by path or by value.
@@ -148,6 +164,8 @@ pub enum FileDetail {
         /// Multiplies red and green.
         strength: f32,
     },
+    /// Heights, in world units; they have a texture.
+    Bump(FileScalar),
 }
 
 /// A displacement map that a mesh file names.
@@ -165,4 +183,6 @@ pub struct FileDisplacement {
     pub wrap: Option<Wrap>,
     /// `r`, `g`, `b`, `a` or `luminance`, if the file says.
     pub channel: Option<&'static str>,
+    /// What names it, for messages: `disp of material "rock" in rock.mtl`.
+    pub from: String,
 }

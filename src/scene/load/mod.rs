@@ -2,19 +2,23 @@
 //!
 //! One file gives one [`Part`] per material (and one more where only some faces of a material have texture
 //! coordinates). Within a part the faces stand in file order, so an OBJ of triangles with one material is
-//! one part whose triangle k is the file's face k. Polygons are cut into fans from their first corner.
+//! one part whose triangle k is the file's face k. Larger polygons are cut into triangles ([`polygon`]).
 //! Texture coordinates come out with v up, whatever the format's habit.
 
 mod draco;
 mod gltf;
+mod locate;
 mod material;
 mod mtl;
 mod obj;
 mod ply;
+mod polygon;
+mod text;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use glam::{Vec2, Vec3};
 use thiserror::Error;
 
 use crate::files::input;
@@ -58,7 +62,7 @@ pub enum LoadMeshErrorKind {
         found: String,
     },
     /// A text file with bytes that are no text.
-    #[error("line {line} is not UTF-8 text; is this an OBJ file?")]
+    #[error("line {line} holds a NUL byte, which no text has; is this an OBJ file?")]
     NotText {
         /// From 1.
         line: usize,
@@ -183,7 +187,7 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     }
     let mut file = match extension.as_str() {
         "obj" => obj::read(&bytes, path)?,
-        "ply" => ply::read(&bytes)?,
+        "ply" => ply::read(&bytes, path)?,
         _ => gltf::read(&bytes, path)?,
     };
     if file.parts.is_empty() {
@@ -212,18 +216,47 @@ impl Parts {
         if mesh.triangles.is_empty() {
             return;
         }
-        let key = (material, mesh.texcoords.is_empty());
+        let index = self.open(name, material, !mesh.texcoords.is_empty());
+        self.parts[index].mesh.append(mesh);
+    }
+
+    /// The number of the part for such faces; if it is new, it has none yet.
+    fn open(&mut self, name: &str, material: Option<usize>, textured: bool) -> usize {
+        let key = (material, textured);
         let index = *self.by_key.entry(key).or_insert(self.parts.len());
         if index == self.parts.len() {
             self.materials.push(material);
             self.parts.push(Part {
                 name: name.to_owned(),
-                mesh,
+                mesh: MeshBuilder::default(),
                 material: None,
             });
-        } else {
-            self.parts[index].mesh.append(mesh);
         }
+        index
+    }
+
+    /// Adds a vertex to a part, and returns its number there; its texture coordinate goes by what the part is opened for.
+    fn push_vertex(
+        &mut self,
+        part: usize,
+        position: Vec3,
+        normal: Option<Vec3>,
+        texcoord: Option<Vec2>,
+    ) -> u32 {
+        let mesh = &mut self.parts[part].mesh;
+        // A mesh too large for 32 bits wraps here and is refused by `build`.
+        let number = mesh.positions.len() as u32;
+        if normal.is_some() && mesh.normals.is_empty() {
+            mesh.normals.resize(mesh.positions.len(), Vec3::ZERO);
+        }
+        let with_normals = normal.is_some() || !mesh.normals.is_empty();
+        if with_normals {
+            // Zero stands for one that is missing.
+            mesh.normals.push(normal.unwrap_or(Vec3::ZERO));
+        }
+        mesh.positions.push(position);
+        mesh.texcoords.extend(texcoord);
+        number
     }
 
     /// The parts, each with its material looked up.

@@ -1,428 +1,345 @@
-//! Wavefront OBJ through tobj.
+//! Wavefront OBJ: vertices first, then the faces over them.
 //!
-//! tobj says nothing of lines, takes an index that resolves to -1 for a missing one, drops faces of one or
-//! two corners, makes triangles of polylines, and knows no continued lines. So the text is first checked
-//! and rewritten into the plain statements that it reads without surprise.
+//! A positive index may name what stands further down, so the file is gone through twice.
 
-use std::cell::RefCell;
-use std::collections::{BTreeSet, HashMap};
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::num::NonZeroU32;
+use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::{FileMaterial, LoadMeshErrorKind, LoadedFile, Parts, mtl};
-use crate::files::input;
-use crate::surface::MeshBuilder;
-
-/// tobj's name for faces before any `o` or `g`.
-const UNNAMED: &str = "unnamed_object";
-
-const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
-    single_index: true,
-    triangulate: true,
-    ignore_points: true,
-    ignore_lines: true,
-};
+use super::mtl::Libraries;
+use super::polygon::Triangulator;
+use super::{LoadMeshErrorKind, LoadedFile, Parts, text};
 
 /// Reads the bytes of the file at `path`.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let text = std::str::from_utf8(bytes).map_err(|e| LoadMeshErrorKind::NotText {
-        line: 1 + bytes[..e.valid_up_to()]
-            .iter()
-            .filter(|&&b| b == b'\n')
-            .count(),
-    })?;
-    let plain = Plain::new(text)?;
-    let libraries = RefCell::new(Libraries::new(path));
-    let mut reader = CountingReader::new(plain.text.as_bytes());
-    let loaded = tobj::load_obj_buf(&mut reader, &OPTIONS, |name| {
-        libraries.borrow_mut().load(name)
-    });
-    let (models, materials) = loaded.map_err(|e| plain.fault(text, reader.lines, e))?;
-    let libraries = libraries.into_inner();
-    let mut warnings = libraries.warnings;
-    // Without any library the loader has warned already.
-    let materials = materials.unwrap_or_default();
-    for name in &plain.materials {
-        if !materials.is_empty() && !materials.iter().any(|m| m.name == *name) {
-            warnings.push(format!("material {name:?} is in no material library"));
-        }
+    let text = text::plain(bytes).map_err(|line| LoadMeshErrorKind::NotText { line })?;
+    let data = Data::read(&text)?;
+    let mut libraries = Libraries::new(path, &data.materials);
+    for name in &data.libraries {
+        libraries.open(name);
     }
-    let several = models.len() > 1;
-    let mut parts = Parts::default();
-    for model in models {
-        let name = if model.name == UNNAMED {
-            ""
-        } else {
-            &model.name
-        };
-        parts.add(name, model.mesh.material_id, builder(&model.mesh));
+    let mut faces = Faces::new(&data, &libraries);
+    for (line, statement) in text::statements(&text) {
+        faces.statement(line, &statement)?;
     }
-    let materials: Vec<FileMaterial> = materials
-        .iter()
-        .zip(&libraries.of_material)
-        .map(|(m, library)| mtl::material(m, library))
-        .collect();
-    let mut parts = parts.finish(|index| materials.get(index).cloned());
-    if several {
-        for part in &mut parts {
-            share_vertices(&mut part.mesh);
-        }
-    }
+    let more = faces.warnings();
+    let parts = faces.parts;
+    let (materials, files, mut warnings) = libraries.finish();
+    warnings.extend(more);
     Ok(LoadedFile {
-        parts,
+        parts: parts.finish(|index| materials.get(index).cloned()),
         warnings,
-        files: Vec::new(),
+        files,
     })
 }
 
-fn builder(mesh: &tobj::Mesh) -> MeshBuilder {
-    // A model's faces are alike in what they have (`Plain` sees to it), so the arrays are full or empty.
-    MeshBuilder {
-        positions: mesh
-            .positions
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&p| Vec3::from(p))
-            .collect(),
-        normals: mesh
-            .normals
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&n| Vec3::from(n))
-            .collect(),
-        texcoords: mesh
-            .texcoords
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&t| Vec2::from(t))
-            .collect(),
-        triangles: mesh.indices.as_chunks().0.to_vec(),
-    }
+/// What faces refer to.
+#[derive(Default)]
+struct Data {
+    positions: Vec<Vec3>,
+    texcoords: Vec<Vec2>,
+    normals: Vec<Vec3>,
+    /// What stands after `mtllib`, each once, in the file's order.
+    libraries: Vec<Vec<u8>>,
+    /// Names after `usemtl`.
+    materials: BTreeSet<String>,
+    /// Whether vertices have colours.
+    coloured: bool,
 }
 
-/// Makes vertices one that are alike bit for bit: tobj shares vertices within a group only.
-fn share_vertices(mesh: &mut MeshBuilder) {
-    let old = std::mem::take(mesh);
-    let mut seen = HashMap::with_capacity(old.positions.len());
-    let new_index: Vec<u32> = (0..old.positions.len())
-        .map(|i| {
-            let position = old.positions[i];
-            let normal = old.normals.get(i);
-            let texcoord = old.texcoords.get(i);
-            let key = (
-                position.to_array().map(f32::to_bits),
-                normal.map(|n| n.to_array().map(f32::to_bits)),
-                texcoord.map(|t| t.to_array().map(f32::to_bits)),
-            );
-            *seen.entry(key).or_insert_with(|| {
-                mesh.positions.push(position);
-                mesh.normals.extend(normal);
-                mesh.texcoords.extend(texcoord);
-                (mesh.positions.len() - 1) as u32
-            })
-        })
-        .collect();
-    mesh.triangles = old
-        .triangles
-        .iter()
-        .map(|t| t.map(|i| new_index[i as usize]))
-        .collect();
-}
-
-/// The material libraries that were asked for.
-struct Libraries<'a> {
-    obj: &'a Path,
-    warnings: Vec<String>,
-    /// Per material in tobj's order, its library.
-    of_material: Vec<PathBuf>,
-}
-
-impl<'a> Libraries<'a> {
-    fn new(obj: &'a Path) -> Self {
-        Self {
-            obj,
-            warnings: Vec::new(),
-            of_material: Vec::new(),
-        }
-    }
-
-    /// `name` is one file whose name may hold spaces, or several files.
-    fn load(&mut self, name: &Path) -> tobj::MTLLoadResult {
-        let name = name.to_string_lossy();
-        let whole = super::beside(self.obj, &name);
-        let files: Vec<PathBuf> = if whole.is_file() {
-            vec![whole]
-        } else {
-            let words = name.split_whitespace();
-            words.map(|n| super::beside(self.obj, n)).collect()
-        };
-        let known = self.of_material.len();
-        let mut text = String::new();
-        for file in files {
-            let cleaned = self.read_library(&file);
-            let materials = cleaned.lines().filter(|l| l.starts_with("newmtl "));
-            self.of_material.extend(materials.map(|_| file.clone()));
-            text += &cleaned;
-        }
-        tobj::load_mtl_buf(&mut text.as_bytes()).inspect_err(|e| {
-            self.of_material.truncate(known);
-            self.warnings.push(format!("material library {name}: {e}"));
-        })
-    }
-
-    /// Its usable statements; none, and a warning, if it cannot be read.
-    fn read_library(&mut self, file: &Path) -> String {
-        match input::read(file) {
-            Ok(bytes) => mtl::clean(&String::from_utf8_lossy(&bytes), file, &mut self.warnings),
-            Err(e) => {
-                let shown = file.display();
-                self.warnings
-                    .push(format!("cannot read the material library {shown}: {e}"));
-                String::new()
+impl Data {
+    fn read(text: &[u8]) -> Result<Self, LoadMeshErrorKind> {
+        let mut data = Self::default();
+        let mut libraries = HashSet::new();
+        for (line, statement) in text::statements(text) {
+            let (keyword, rest) = text::split_word(&statement);
+            let syntax = |expected| syntax(line, &statement, expected);
+            match keyword {
+                b"v" => data.position(rest).map_err(syntax)?,
+                b"vt" => {
+                    let texcoord = numbers::<2>(rest, 1);
+                    let texcoord = texcoord.ok_or_else(|| syntax("`vt` and 1 to 3 numbers"))?;
+                    data.texcoords.push(texcoord.into());
+                }
+                b"vn" => {
+                    let normal = numbers::<3>(rest, 3);
+                    let normal = normal.ok_or_else(|| syntax("`vn` and 3 numbers"))?;
+                    data.normals.push(normal.into());
+                }
+                b"usemtl" => {
+                    data.materials.insert(material_name(rest));
+                }
+                b"mtllib" if libraries.insert(rest.to_owned()) => {
+                    data.libraries.push(rest.to_owned());
+                }
+                _ => {}
             }
         }
+        Ok(data)
+    }
+
+    /// Three numbers, perhaps a weight, perhaps a colour.
+    fn position(&mut self, rest: &[u8]) -> Result<(), &'static str> {
+        let position = numbers::<3>(rest, 3).ok_or("`v` and 3 numbers")?;
+        let mut more = text::words(rest).skip(3);
+        let mut position = Vec3::from(position);
+        match (more.next(), more.next()) {
+            (Some(weight), None) => {
+                let weight = text::parse(weight).filter(|&w: &f32| w != 0.0);
+                position /= weight.ok_or("a weight w other than 0")?;
+            }
+            (_, colour) => self.coloured |= colour.is_some(),
+        }
+        self.positions.push(position);
+        Ok(())
     }
 }
 
-/// How many of each element have been defined.
-#[derive(Clone, Copy, Default)]
+/// Faces become parts as they are read.
+struct Faces<'a> {
+    data: &'a Data,
+    libraries: &'a Libraries<'a>,
+    parts: Parts,
+    /// Per part and indices of position, texture coordinate and normal, the part's vertex.
+    vertices: HashMap<(u32, Corner), u32>,
+    triangulator: Triangulator,
+    group: String,
+    material: Option<usize>,
+    so_far: Counts,
+    /// Of the face at hand.
+    corners: Vec<Corner>,
+    positions: Vec<Vec3>,
+    without_normals: Dropped,
+    without_texcoords: Dropped,
+}
+
+/// Indices, counted from 1 as the file counts.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Corner {
+    v: NonZeroU32,
+    vt: Option<NonZeroU32>,
+    vn: Option<NonZeroU32>,
+}
+
+/// What the index stands for.
+fn of<T: Copy>(values: &[T], index: NonZeroU32) -> T {
+    values[index.get() as usize - 1]
+}
+
+/// How many of each have been defined above a face: negative indices count back from there.
+#[derive(Default)]
 struct Counts {
     v: usize,
     vt: usize,
     vn: usize,
 }
 
-impl Counts {
-    fn count(&mut self, keyword: &str) {
+/// Faces that lost something.
+#[derive(Default)]
+struct Dropped {
+    faces: usize,
+    first_line: usize,
+}
+
+impl Dropped {
+    fn add(&mut self, line: usize) {
+        if self.faces == 0 {
+            self.first_line = line;
+        }
+        self.faces += 1;
+    }
+
+    fn warning(&self, what: &str) -> Option<String> {
+        let Self { faces, first_line } = self;
+        (*faces > 0).then(|| format!("{what}: {faces} faces, the first at line {first_line}"))
+    }
+}
+
+impl<'a> Faces<'a> {
+    fn new(data: &'a Data, libraries: &'a Libraries<'a>) -> Self {
+        Self {
+            data,
+            libraries,
+            parts: Parts::default(),
+            vertices: HashMap::new(),
+            triangulator: Triangulator::new(),
+            group: String::new(),
+            material: None,
+            so_far: Counts::default(),
+            corners: Vec::new(),
+            positions: Vec::new(),
+            without_normals: Dropped::default(),
+            without_texcoords: Dropped::default(),
+        }
+    }
+
+    fn statement(&mut self, line: usize, statement: &[u8]) -> Result<(), LoadMeshErrorKind> {
+        let (keyword, rest) = text::split_word(statement);
         match keyword {
-            "v" => self.v += 1,
-            "vt" => self.vt += 1,
-            "vn" => self.vn += 1,
+            b"v" => self.so_far.v += 1,
+            b"vt" => self.so_far.vt += 1,
+            b"vn" => self.so_far.vn += 1,
+            b"o" | b"g" => self.group = text::decoded(rest),
+            b"usemtl" => self.material = self.libraries.index(&material_name(rest)),
+            b"f" | b"fo" => {
+                self.read_corners(line, rest)?;
+                if self.corners.len() < 3 {
+                    return Err(syntax(line, statement, "a face of at least 3 corners"));
+                }
+                self.add_face();
+            }
             _ => {}
         }
-    }
-}
-
-/// The checked and rewritten text.
-struct Plain {
-    text: String,
-    /// Per line of `text`, its line in the file, from 1.
-    lines: Vec<usize>,
-    /// Names after `usemtl`.
-    materials: BTreeSet<String>,
-}
-
-impl Plain {
-    fn new(text: &str) -> Result<Self, LoadMeshErrorKind> {
-        let mut plain = Self {
-            text: String::with_capacity(text.len()),
-            lines: Vec::new(),
-            materials: BTreeSet::new(),
-        };
-        let mut total = Counts::default();
-        for (_, line) in statements(text) {
-            total.count(line.split_whitespace().next().unwrap_or(""));
-        }
-        let mut so_far = Counts::default();
-        // tobj keeps one array of normals per group: faces that differ in what they have must not share one.
-        let mut group = UNNAMED.to_owned();
-        let mut layout = None;
-        for (number, line) in statements(text) {
-            let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((&line, ""));
-            let rest = rest.trim();
-            so_far.count(keyword);
-            match keyword {
-                "v" => plain.push(number, "v", &coordinates(rest, 3)),
-                "vn" => plain.push(number, "vn", &coordinates(rest, 3)),
-                "vt" => plain.push(number, "vt", &coordinates(rest, 2)),
-                "o" | "g" => {
-                    group = if rest.is_empty() { UNNAMED } else { rest }.to_owned();
-                    plain.push(number, "g", &group);
-                }
-                "usemtl" if !rest.is_empty() => {
-                    plain.materials.insert(rest.to_owned());
-                    plain.push(number, "usemtl", rest);
-                }
-                "mtllib" => plain.push(number, "mtllib", rest),
-                "f" | "fo" => {
-                    let this = Some(check_face(number, rest, so_far, total)?);
-                    if layout.is_some() && layout != this {
-                        plain.push(number, "g", &group);
-                    }
-                    layout = this;
-                    plain.push(number, "f", rest);
-                }
-                _ => {}
-            }
-        }
-        Ok(plain)
+        Ok(())
     }
 
-    fn push(&mut self, number: usize, keyword: &str, rest: &str) {
-        // Writing to a String cannot fail.
-        let _ = writeln!(self.text, "{keyword} {rest}");
-        self.lines.push(number);
-    }
-
-    /// tobj's error after `read` lines, in the file's terms.
-    fn fault(&self, text: &str, read: usize, error: tobj::LoadError) -> LoadMeshErrorKind {
-        use tobj::LoadError as E;
-        let line = read
-            .checked_sub(1)
-            .and_then(|i| self.lines.get(i).copied())
-            .unwrap_or(0);
-        let expected = match error {
-            E::PositionParseError => "`v` and 3 numbers",
-            E::NormalParseError => "`vn` and 3 numbers",
-            E::TexcoordParseError => "`vt` and 1 to 3 numbers",
-            E::ScalingByZeroError => "a weight w other than 0",
-            _ => {
-                return LoadMeshErrorKind::Malformed {
-                    what: format!("line {line}"),
-                    problem: error.to_string(),
-                };
-            }
-        };
-        let found = text.lines().nth(line.saturating_sub(1)).unwrap_or("");
-        LoadMeshErrorKind::Syntax {
-            line,
-            found: found.trim().to_owned(),
-            expected,
-        }
-    }
-}
-
-/// The statements without comments, continued lines joined, each with the number of its first line.
-fn statements(text: &str) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)> {
-    let mut lines = text.lines().enumerate();
-    std::iter::from_fn(move || {
-        let (number, first) = lines.next()?;
-        let mut whole = std::borrow::Cow::Borrowed(uncommented(first));
-        while whole.ends_with('\\') {
-            let joined = whole.to_mut();
-            joined.pop();
-            joined.push(' ');
-            match lines.next() {
-                Some((_, next)) => joined.push_str(uncommented(next)),
-                None => break,
-            }
-        }
-        Some((number + 1, whole))
-    })
-}
-
-/// Names may hold a `#`; a comment is a `#` at the start or after a blank.
-fn uncommented(line: &str) -> &str {
-    let start = line
-        .match_indices('#')
-        .map(|(i, _)| i)
-        .find(|&i| line[..i].ends_with(char::is_whitespace) || i == 0);
-    line[..start.unwrap_or(line.len())].trim()
-}
-
-/// The numbers that are read: a position keeps a fourth (its weight) but no colours, a missing v is 0.
-fn coordinates(rest: &str, wanted: usize) -> String {
-    let mut words: Vec<&str> = rest.split_whitespace().collect();
-    if words.len() != 4 || wanted != 3 {
-        words.truncate(wanted);
-    }
-    if wanted == 2 && words.len() == 1 {
-        words.push("0");
-    }
-    words.join(" ")
-}
-
-/// Which of (texture coordinate, normal) the corners of a face have; all of them must agree.
-fn check_face(
-    line: usize,
-    rest: &str,
-    so_far: Counts,
-    total: Counts,
-) -> Result<[bool; 2], LoadMeshErrorKind> {
-    let syntax = |found: &str, expected| LoadMeshErrorKind::Syntax {
-        line,
-        found: found.to_owned(),
-        expected,
-    };
-    let mut layout = None;
-    let mut corners = 0;
-    for corner in rest.split_whitespace() {
-        let mut parts = corner.split('/');
-        let [v, vt, vn] = [(); 3].map(|()| parts.next().unwrap_or(""));
-        if v.is_empty() || parts.next().is_some() {
-            return Err(syntax(corner, "v, v/vt, v//vn or v/vt/vn"));
-        }
-        let checks = [
-            ("vertex", v, so_far.v, total.v),
-            ("texture coordinate", vt, so_far.vt, total.vt),
-            ("normal", vn, so_far.vn, total.vn),
-        ];
-        for (what, text, so_far, total) in checks {
-            if text.is_empty() {
-                continue;
-            }
-            let index: i64 = text
-                .parse()
-                .map_err(|_| syntax(corner, "whole numbers as indices"))?;
-            // Negative indices count back from the last one defined so far.
-            let good = match index {
-                1.. => index as u64 <= total as u64,
-                _ => index != 0 && index.unsigned_abs() <= so_far as u64,
-            };
-            if !good {
-                return Err(LoadMeshErrorKind::IndexOutOfRange {
+    /// Reads a face into `corners`: all of them have texture coordinates, or none.
+    fn read_corners(&mut self, line: usize, rest: &[u8]) -> Result<(), LoadMeshErrorKind> {
+        self.corners.clear();
+        let (mut normals, mut texcoords) = (Kept::default(), Kept::default());
+        for word in text::words(rest) {
+            let [v, vt, vn] = indices(word)
+                .ok_or_else(|| syntax(line, word, "v, v/vt, v//vn or v/vt/vn in whole numbers"))?;
+            let count = self.data.positions.len();
+            let v = v.unwrap_or(0);
+            let v = resolve(v, self.so_far.v, count).ok_or_else(|| {
+                LoadMeshErrorKind::IndexOutOfRange {
                     place: format!("line {line}"),
-                    what,
-                    index,
-                    count: if index < 0 { so_far } else { total },
+                    what: "vertex",
+                    index: v,
+                    count: if v < 0 { self.so_far.v } else { count },
                     counted: " (counted from 1)",
-                });
-            }
+                }
+            })?;
+            let vt = texcoords.keep(vt, self.so_far.vt, self.data.texcoords.len(), |_| true);
+            let finite = |i| of(&self.data.normals, i).is_finite();
+            let vn = normals.keep(vn, self.so_far.vn, self.data.normals.len(), finite);
+            self.corners.push(Corner { v, vt, vn });
         }
-        let this = [!vt.is_empty(), !vn.is_empty()];
-        if *layout.get_or_insert(this) != this {
-            return Err(syntax(rest, "corners that are all of one kind"));
+        if normals.some_refused {
+            self.without_normals.add(line);
         }
-        corners += 1;
-    }
-    layout
-        .filter(|_| corners >= 3)
-        .ok_or_else(|| syntax(&format!("f {rest}"), "a face of at least 3 corners"))
-}
-
-/// Counts the lines that went through.
-struct CountingReader<'a> {
-    rest: &'a [u8],
-    lines: usize,
-}
-
-impl<'a> CountingReader<'a> {
-    fn new(rest: &'a [u8]) -> Self {
-        Self { rest, lines: 0 }
-    }
-}
-
-impl std::io::Read for CountingReader<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        self.rest.read(buffer)
-    }
-}
-
-impl std::io::BufRead for CountingReader<'_> {
-    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
-        Ok(self.rest)
+        if texcoords.some && texcoords.some_missing {
+            self.without_texcoords.add(line);
+        }
+        if texcoords.some_missing {
+            self.corners.iter_mut().for_each(|c| c.vt = None);
+        }
+        Ok(())
     }
 
-    fn consume(&mut self, amount: usize) {
-        let (gone, rest) = self.rest.split_at(amount);
-        self.lines += gone.iter().filter(|&&b| b == b'\n').count();
-        self.rest = rest;
+    fn add_face(&mut self) {
+        let positions = self.corners.iter().map(|c| of(&self.data.positions, c.v));
+        self.positions.clear();
+        self.positions.extend(positions);
+        let textured = self.corners[0].vt.is_some();
+        let part = self.parts.open(&self.group, self.material, textured);
+        for triangle in self.triangulator.cut(&self.positions) {
+            let triangle = triangle.map(|i| {
+                let corner = self.corners[i as usize];
+                match self.vertices.entry((part as u32, corner)) {
+                    Entry::Occupied(known) => *known.get(),
+                    Entry::Vacant(new) => *new.insert(self.parts.push_vertex(
+                        part,
+                        self.positions[i as usize],
+                        corner.vn.map(|vn| of(&self.data.normals, vn)),
+                        corner.vt.map(|vt| of(&self.data.texcoords, vt)),
+                    )),
+                }
+            });
+            self.parts.parts[part].mesh.triangles.push(triangle);
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let lost = [
+            self.without_normals
+                .warning("normals are out of range or not finite, and are computed instead"),
+            self.without_texcoords.warning(
+                "texture coordinates are out of range or missing at a corner, and are left out",
+            ),
+            self.triangulator.warning(),
+            self.data
+                .coloured
+                .then(|| "the colours of vertices are left out".into()),
+        ];
+        lost.into_iter().flatten().collect()
+    }
+}
+
+/// What became of one kind of index in a face.
+#[derive(Default)]
+struct Kept {
+    /// Some corners name one.
+    some: bool,
+    /// Some corners have none that could be used.
+    some_missing: bool,
+    /// Some name one that cannot be used.
+    some_refused: bool,
+}
+
+impl Kept {
+    fn keep(
+        &mut self,
+        index: Option<i64>,
+        so_far: usize,
+        total: usize,
+        good: impl Fn(NonZeroU32) -> bool,
+    ) -> Option<NonZeroU32> {
+        let kept = index.and_then(|i| resolve(i, so_far, total));
+        let kept = kept.filter(|&i| good(i));
+        self.some |= index.is_some();
+        self.some_missing |= kept.is_none();
+        self.some_refused |= index.is_some() && kept.is_none();
+        kept
+    }
+}
+
+/// The index counted from 1; none if there is no such thing. Negative ones count back from here.
+fn resolve(index: i64, so_far: usize, total: usize) -> Option<NonZeroU32> {
+    let (from_1, count) = match index {
+        ..0 => (i64::try_from(so_far).ok()?.checked_add(index + 1)?, so_far),
+        _ => (index, total),
+    };
+    let from_1 = u32::try_from(from_1).ok().and_then(NonZeroU32::new)?;
+    (from_1.get() as usize <= count).then_some(from_1)
+}
+
+/// Of position, texture coordinate and normal, as written.
+fn indices(corner: &[u8]) -> Option<[Option<i64>; 3]> {
+    let mut found = [None; 3];
+    for (i, part) in corner.split(|&b| b == b'/').enumerate() {
+        let index = found.get_mut(i)?;
+        if !part.is_empty() {
+            *index = Some(text::parse(part)?);
+        }
+    }
+    found[0].is_some().then_some(found)
+}
+
+/// The first N numbers, at least so many; the others are 0.
+fn numbers<const N: usize>(rest: &[u8], least: usize) -> Option<[f32; N]> {
+    let mut values = [0.0; N];
+    let mut count = 0;
+    for (value, word) in values.iter_mut().zip(text::words(rest)) {
+        *value = text::parse(word)?;
+        count += 1;
+    }
+    (count >= least).then_some(values)
+}
+
+fn material_name(rest: &[u8]) -> String {
+    text::decoded(text::unquoted(rest))
+}
+
+fn syntax(line: usize, found: &[u8], expected: &'static str) -> LoadMeshErrorKind {
+    LoadMeshErrorKind::Syntax {
+        line,
+        found: text::shown(found),
+        expected,
     }
 }
 

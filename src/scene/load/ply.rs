@@ -1,24 +1,37 @@
 //! Stanford PLY, text and binary, through ply-rs-bw.
+//!
+//! Read: vertices with normals and texture coordinates, faces with texture coordinates of their own, triangle strips, and the
+//! pictures that MeshLab names in comments. Elements are read one by one: what is kept of a file is not larger than the file.
+
+mod header;
+mod source;
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::path::Path;
 
 use glam::{Vec2, Vec3};
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{
-    DefaultElement, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+use ply_rs_bw::parser::ParseError;
+
+use super::locate::Locator;
+use super::polygon::Triangulator;
+use super::{
+    FileColor, FileMaterial, FileTexture, FileTextureUse, LoadMeshErrorKind, LoadedFile, Parts,
+    text,
 };
+use crate::surface::{UvTransform, Wrap};
+use header::{Element, Header, is_list};
+use source::{Face, Skipped, Source, Vertex};
 
-use super::{LoadMeshErrorKind, LoadedFile, Part, fan};
-use crate::surface::MeshBuilder;
-
-/// Reads the bytes of a file. Other elements than `vertex` and `face` are skipped.
-pub(super) fn read(bytes: &[u8]) -> Result<LoadedFile, LoadMeshErrorKind> {
-    let mut reader = Reader::new(bytes);
-    let header = Parser::<DefaultElement>::new()
-        .read_header(&mut reader)
-        .map_err(|e| malformed("header", &e))?;
-    check_counts(&header, reader.get_ref().len())?;
+/// Reads the bytes of the file at `path`.
+pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+    let header = Header::read(bytes)?;
+    check_counts(&header)?;
     let has = |name: &str| {
-        let vertex = header.elements.get("vertex");
-        vertex.is_some_and(|e| e.properties.contains_key(name))
+        header
+            .elements
+            .iter()
+            .any(|e| e.name == "vertex" && e.has(name))
     };
     if !["x", "y", "z"].into_iter().all(has) {
         return Err(LoadMeshErrorKind::Malformed {
@@ -26,67 +39,111 @@ pub(super) fn read(bytes: &[u8]) -> Result<LoadedFile, LoadMeshErrorKind> {
             problem: "no element `vertex` with the properties x, y and z".into(),
         });
     }
-    let mut vertices = Vec::new();
-    let mut faces = Vec::new();
-    for (name, element) in &header.elements {
-        let what = format!("element {name:?}");
-        match name.as_str() {
-            "vertex" => {
-                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
-                vertices = read.map_err(|e| malformed(&what, &e))?;
-            }
-            "face" => {
-                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
-                faces = read.map_err(|e| malformed(&what, &e))?;
-            }
+    let mut vertices = Vertices {
+        has_normals: ["nx", "ny", "nz"].into_iter().all(has),
+        has_texcoords: has("s"),
+        ..Vertices::default()
+    };
+    let vertex = header.elements.iter().find(|e| e.name == "vertex");
+    let mut faces = Faces {
+        vertices: vertex.map_or(0, |e| e.definition.count),
+        ..Faces::default()
+    };
+    let mut source = Source::new(&header);
+    for element in &header.elements {
+        match &element.name[..] {
+            "vertex" => vertices.read(&mut source, element)?,
+            "face" => faces.read(&mut source, element)?,
+            "tristrips" => faces.read_strips(&mut source, element)?,
             _ => {
-                Parser::<Skipped>::new()
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(|e| malformed(&what, &e))?;
+                for number in 0..element.definition.count {
+                    source.next::<Skipped>(element, number)?;
+                }
             }
         }
     }
-    let has_normals = ["nx", "ny", "nz"].into_iter().all(has);
-    let has_texcoords = U_NAMES.into_iter().any(has) && V_NAMES.into_iter().any(has);
-    let mesh = builder(&vertices, &faces, has_normals, has_texcoords)?;
-    let mut file = LoadedFile::default();
-    if !mesh.triangles.is_empty() {
-        file.parts.push(Part {
-            name: String::new(),
-            mesh,
-            material: None,
-        });
+    let mut warnings = left_out(&header);
+    let mut locator = Locator::default();
+    let materials: Vec<_> = header
+        .textures
+        .iter()
+        .map(|name| textured_material(&mut locator, path, name, &mut warnings))
+        .collect();
+    let lost = vertices.lost_normals;
+    let mut builder = Builder::new(vertices, &faces, materials.len());
+    builder.add(&faces);
+    if lost > 0 {
+        warnings.push(format!(
+            "normals are not finite, and are computed instead: {lost} vertices"
+        ));
     }
-    Ok(file)
+    if faces.too_few > 0 {
+        let few = faces.too_few;
+        warnings.push(format!(
+            "faces of fewer than three corners are left out: {few}"
+        ));
+    }
+    warnings.extend(builder.triangulator.warning());
+    let parts = builder.finish();
+    let textured = parts
+        .parts
+        .iter()
+        .any(|part| !part.mesh.texcoords.is_empty());
+    if !materials.is_empty() && !textured {
+        warnings.push("the file's textures are left out: it has no texture coordinates".into());
+    }
+    Ok(LoadedFile {
+        parts: parts.finish(|index| materials.get(index).cloned()),
+        warnings,
+        files: Vec::new(),
+    })
 }
-
-const U_NAMES: [&str; 4] = ["u", "s", "texture_u", "texture_s"];
-const V_NAMES: [&str; 4] = ["v", "t", "texture_v", "texture_t"];
 
 /// Every element takes at least a byte, so a count beyond the bytes left is a lie; without this an element
 /// without properties would be read for ever.
-fn check_counts(header: &Header, bytes_left: usize) -> Result<(), LoadMeshErrorKind> {
-    for (name, element) in &header.elements {
-        if element.count > bytes_left {
+fn check_counts(header: &Header) -> Result<(), LoadMeshErrorKind> {
+    let bytes_left = header.body.len();
+    for element in &header.elements {
+        let count = element.definition.count;
+        if count > bytes_left {
             return Err(LoadMeshErrorKind::Malformed {
-                what: format!("element {name:?}"),
+                what: format!("element {:?}", element.name),
                 problem: format!(
-                    "the header promises {} of them, but only {bytes_left} bytes follow; is the file cut off?",
-                    element.count
+                    "the header promises {count} of them, but only {bytes_left} bytes follow; is the file cut off?"
                 ),
             });
         }
-        let named = ["vertex_indices", "vertex_index"];
-        for property in named.iter().filter_map(|n| element.properties.get(*n)) {
-            if name == "face" && !matches!(property.data_type, PropertyType::List(..)) {
-                return Err(LoadMeshErrorKind::Malformed {
-                    what: format!("property {:?} of the faces", property.name),
-                    problem: "expected a list".into(),
-                });
-            }
+        if element.has("corners") && !is_list(element, "corners") {
+            return Err(LoadMeshErrorKind::Malformed {
+                what: format!("vertex indices of element {:?}", element.name),
+                problem: "expected a list".into(),
+            });
         }
     }
     Ok(())
+}
+
+/// What there is in the file and not in the result.
+fn left_out(header: &Header) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let others = |name: &str| {
+        header
+            .elements
+            .iter()
+            .any(|e| e.others.iter().any(|o| o == name))
+    };
+    if ["red", "r", "diffuse_red"].into_iter().any(others) {
+        warnings.push("colours of vertices or faces are left out".into());
+    }
+    let materials = header.elements.iter().any(|e| e.name == "material");
+    if materials
+        || ["material_index", "material_indices"]
+            .into_iter()
+            .any(others)
+    {
+        warnings.push("materials are left out: PLY has no common form for them".into());
+    }
+    warnings
 }
 
 fn malformed(what: &str, error: &ParseError) -> LoadMeshErrorKind {
@@ -107,252 +164,269 @@ fn malformed(what: &str, error: &ParseError) -> LoadMeshErrorKind {
     }
 }
 
-fn builder(
-    vertices: &[Vertex],
-    faces: &[Face],
+/// White under the picture that a comment names.
+fn textured_material(
+    locator: &mut Locator,
+    path: &Path,
+    name: &[u8],
+    warnings: &mut Vec<String>,
+) -> FileMaterial {
+    let located = locator.locate(path, name);
+    let from = "comment TextureFile".to_owned();
+    warnings.extend(located.note.map(|note| format!("{from}: {note}")));
+    FileMaterial {
+        name: text::decoded(name),
+        base_color: FileColor {
+            factor: Vec3::ONE,
+            texture: Some(FileTextureUse {
+                source: FileTexture::Path(located.path),
+                wrap: Wrap::default(),
+                uv: UvTransform::default(),
+                from,
+            }),
+        },
+        ..FileMaterial::default()
+    }
+}
+
+/// What the element `vertex` holds.
+#[derive(Default)]
+struct Vertices {
+    positions: Vec<Vec3>,
     has_normals: bool,
+    normals: Vec<Vec3>,
     has_texcoords: bool,
-) -> Result<MeshBuilder, LoadMeshErrorKind> {
-    let mut mesh = MeshBuilder {
-        positions: vertices.iter().map(|v| v.position).collect(),
-        ..MeshBuilder::default()
-    };
-    if has_normals {
-        mesh.normals = vertices.iter().map(|v| v.normal).collect();
-    }
-    if has_texcoords {
-        mesh.texcoords = vertices.iter().map(|v| v.texcoord).collect();
-    }
-    for (number, face) in faces.iter().enumerate() {
-        let mut corners = Vec::with_capacity(face.corners.len());
-        for &index in &face.corners {
-            if index < 0 || index as u64 >= vertices.len() as u64 {
-                return Err(LoadMeshErrorKind::IndexOutOfRange {
-                    place: format!("face {number}"),
-                    what: "vertex",
-                    index,
-                    count: vertices.len(),
-                    counted: " (counted from 0)",
+    texcoords: Vec<Vec2>,
+    lost_normals: usize,
+}
+
+impl Vertices {
+    fn read(&mut self, source: &mut Source, element: &Element) -> Result<(), LoadMeshErrorKind> {
+        for number in 0..element.definition.count {
+            let vertex: Vertex = source.next(element, number)?;
+            if !vertex.position.is_finite() {
+                return Err(LoadMeshErrorKind::Malformed {
+                    what: source.place(element, number),
+                    problem: "a coordinate is not a finite number".into(),
                 });
             }
-            corners.push(index as u32);
+            self.positions.push(vertex.position);
+            if self.has_normals {
+                let finite = vertex.normal.is_finite();
+                self.lost_normals += usize::from(!finite);
+                // Zero stands for one that is missing.
+                self.normals
+                    .push(if finite { vertex.normal } else { Vec3::ZERO });
+            }
+            if self.has_texcoords {
+                self.texcoords.push(vertex.texcoord);
+            }
         }
-        mesh.triangles.extend(fan(&corners));
+        Ok(())
     }
-    Ok(mesh)
 }
 
+/// Polygons one after the other. Vertices may come after them in a file, so they are kept until both are there.
 #[derive(Default)]
-struct Vertex {
-    position: Vec3,
-    normal: Vec3,
-    texcoord: Vec2,
+struct Faces {
+    /// How many vertices there will be.
+    vertices: usize,
+    polygons: Vec<Polygon>,
+    corners: Vec<u32>,
+    /// Texture coordinates of corners, for the polygons that have their own.
+    texcoords: Vec<Vec2>,
+    too_few: usize,
 }
 
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let target = match name {
-            "x" => &mut self.position.x,
-            "y" => &mut self.position.y,
-            "z" => &mut self.position.z,
-            "nx" => &mut self.normal.x,
-            "ny" => &mut self.normal.y,
-            "nz" => &mut self.normal.z,
-            _ if U_NAMES.contains(&name) => &mut self.texcoord.x,
-            _ if V_NAMES.contains(&name) => &mut self.texcoord.y,
-            _ => return PropertyAccessResult::Ignored,
-        };
-        let value = match property {
-            Property::Float(x) => x,
-            Property::Double(x) => x as f32,
-            _ => match integer(&property) {
-                Some(x) => x as f32,
-                None => return PropertyAccessResult::UnsupportedType,
-            },
-        };
-        *target = value;
-        PropertyAccessResult::Set
-    }
+struct Polygon {
+    corners: usize,
+    /// Whether it has texture coordinates of its own.
+    textured: bool,
+    texture: i32,
 }
 
-fn integer(property: &Property) -> Option<i64> {
-    match *property {
-        Property::Char(x) => Some(x.into()),
-        Property::UChar(x) => Some(x.into()),
-        Property::Short(x) => Some(x.into()),
-        Property::UShort(x) => Some(x.into()),
-        Property::Int(x) => Some(x.into()),
-        Property::UInt(x) => Some(x.into()),
-        _ => None,
-    }
-}
-
-#[derive(Default)]
-struct Face {
-    corners: Vec<i64>,
-}
-
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        if name != "vertex_indices" && name != "vertex_index" {
-            return PropertyAccessResult::Ignored;
+impl Faces {
+    fn read(&mut self, source: &mut Source, element: &Element) -> Result<(), LoadMeshErrorKind> {
+        let own_texcoords = element.has("texcoord");
+        for number in 0..element.definition.count {
+            let face: Face = source.next(element, number)?;
+            let count = face.corners.len();
+            if own_texcoords && ![0, 2 * count].contains(&face.texcoords.len()) {
+                return Err(LoadMeshErrorKind::Malformed {
+                    what: source.place(element, number),
+                    problem: format!(
+                        "{} numbers are its texture coordinates; expected two for each of its {count} corners",
+                        face.texcoords.len()
+                    ),
+                });
+            }
+            let textured = own_texcoords && !face.texcoords.is_empty();
+            let texcoords = face
+                .texcoords
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&st| Vec2::from_array(st));
+            if count < 3 {
+                self.too_few += 1;
+                continue;
+            }
+            self.texcoords.extend(texcoords);
+            for index in face.corners {
+                self.push_corner(index, &element.name, number)?;
+            }
+            self.polygons.push(Polygon {
+                corners: count,
+                textured,
+                texture: face.texture,
+            });
         }
-        self.corners = match property {
-            Property::ListChar(list) => list.into_iter().map(i64::from).collect(),
-            Property::ListUChar(list) => list.into_iter().map(i64::from).collect(),
-            Property::ListShort(list) => list.into_iter().map(i64::from).collect(),
-            Property::ListUShort(list) => list.into_iter().map(i64::from).collect(),
-            Property::ListInt(list) => list.into_iter().map(i64::from).collect(),
-            Property::ListUInt(list) => list.into_iter().map(i64::from).collect(),
-            _ => return PropertyAccessResult::UnsupportedType,
-        };
-        PropertyAccessResult::Set
+        Ok(())
+    }
+
+    /// Strips as Stanford's tools write them: -1 ends one and begins the next.
+    fn read_strips(
+        &mut self,
+        source: &mut Source,
+        element: &Element,
+    ) -> Result<(), LoadMeshErrorKind> {
+        for number in 0..element.definition.count {
+            let strips: Face = source.next(element, number)?;
+            for strip in strips.corners.split(|&index| index == -1) {
+                for (i, triangle) in strip.windows(3).enumerate() {
+                    let &[a, b, c] = triangle else { continue };
+                    // Strips turn corners by naming one twice.
+                    if a == b || b == c || c == a {
+                        continue;
+                    }
+                    let [a, b] = if i % 2 == 0 { [a, b] } else { [b, a] };
+                    for index in [a, b, c] {
+                        self.push_corner(index, &element.name, number)?;
+                    }
+                    self.polygons.push(Polygon {
+                        corners: 3,
+                        textured: false,
+                        texture: 0,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn push_corner(
+        &mut self,
+        index: i64,
+        what: &str,
+        number: usize,
+    ) -> Result<(), LoadMeshErrorKind> {
+        let vertex = u32::try_from(index)
+            .ok()
+            .filter(|&i| (i as usize) < self.vertices);
+        self.corners
+            .push(vertex.ok_or_else(|| LoadMeshErrorKind::IndexOutOfRange {
+                place: format!("{what} {number}"),
+                what: "vertex",
+                index,
+                count: self.vertices,
+                counted: " (counted from 0)",
+            })?);
+        Ok(())
     }
 }
 
-/// An element that is read past.
-struct Skipped;
+/// Makes parts of faces: one for each texture, with and without texture coordinates.
+struct Builder {
+    vertices: Vertices,
+    textures: usize,
+    parts: Parts,
+    /// There is one part, and its vertices are the file's.
+    whole: bool,
+    /// Else: per part, vertex and texture coordinates, the part's vertex.
+    known: HashMap<(u32, u32, Option<[u32; 2]>), u32>,
+    triangulator: Triangulator,
+}
 
-impl PropertyAccess for Skipped {
-    fn new() -> Self {
-        Self
+impl Builder {
+    fn new(vertices: Vertices, faces: &Faces, textures: usize) -> Self {
+        Self {
+            vertices,
+            textures,
+            whole: faces.texcoords.is_empty() && textures == 0,
+            parts: Parts::default(),
+            known: HashMap::new(),
+            triangulator: Triangulator::new(),
+        }
+    }
+
+    fn add(&mut self, faces: &Faces) {
+        let (mut corners, mut texcoords) = (&faces.corners[..], &faces.texcoords[..]);
+        let mut positions = Vec::new();
+        for polygon in &faces.polygons {
+            let (these, others) = corners.split_at(polygon.corners);
+            corners = others;
+            let own = polygon.textured.then(|| {
+                let (own, others) = texcoords.split_at(polygon.corners);
+                texcoords = others;
+                own
+            });
+            let corner = |&index: &u32| self.vertices.positions[index as usize];
+            positions.clear();
+            positions.extend(these.iter().map(corner));
+            self.add_polygon(polygon, these, &positions, own);
+        }
+    }
+
+    fn add_polygon(
+        &mut self,
+        polygon: &Polygon,
+        corners: &[u32],
+        positions: &[Vec3],
+        own: Option<&[Vec2]>,
+    ) {
+        let textured = own.is_some() || self.vertices.has_texcoords;
+        let texture = usize::try_from(polygon.texture).ok();
+        let texture = texture.filter(|&t| textured && t < self.textures);
+        let part = self.parts.open("", texture, textured);
+        for triangle in self.triangulator.cut(positions) {
+            let triangle = triangle.map(|i| {
+                let i = i as usize;
+                if self.whole {
+                    return corners[i];
+                }
+                let vertex = corners[i] as usize;
+                let texcoord = match own {
+                    Some(own) => Some(own[i]),
+                    None => self.vertices.texcoords.get(vertex).copied(),
+                };
+                let key = (
+                    part as u32,
+                    corners[i],
+                    texcoord.map(|st| st.to_array().map(f32::to_bits)),
+                );
+                match self.known.entry(key) {
+                    Entry::Occupied(known) => *known.get(),
+                    Entry::Vacant(new) => *new.insert(self.parts.push_vertex(
+                        part,
+                        positions[i],
+                        self.vertices.normals.get(vertex).copied(),
+                        texcoord,
+                    )),
+                }
+            });
+            self.parts.parts[part].mesh.triangles.push(triangle);
+        }
+    }
+
+    fn finish(mut self) -> Parts {
+        if let ([part], true) = (&mut self.parts.parts[..], self.whole) {
+            part.mesh.positions = self.vertices.positions;
+            part.mesh.normals = self.vertices.normals;
+            part.mesh.texcoords = self.vertices.texcoords;
+        }
+        self.parts
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::tests::load_bytes;
-    use super::*;
-
-    const PROPERTIES: &str = "element vertex 4\nproperty float x\nproperty double y\nproperty float z\n\
-        property float nx\nproperty float ny\nproperty float nz\nproperty uchar red\nproperty float s\nproperty float t\n\
-        element face 1\nproperty uchar flags\nproperty list uchar int vertex_indices\nend_header\n";
-
-    /// (x, y, z) of a square, with its normal along z and s = x, t = y.
-    const SQUARE: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-
-    fn ascii() -> Vec<u8> {
-        let mut text = format!("ply\nformat ascii 1.0\n{PROPERTIES}");
-        for [x, y] in SQUARE {
-            text += &format!("{x} {y} 0 0 0 1 255 {x} {y}\n");
-        }
-        text += "7 4 0 1 2 3\n";
-        text.into_bytes()
-    }
-
-    fn binary(big: bool) -> Vec<u8> {
-        let order = if big { "big" } else { "little" };
-        let mut bytes = format!("ply\nformat binary_{order}_endian 1.0\n{PROPERTIES}").into_bytes();
-        let mut put = |mut value: Vec<u8>| {
-            // Given in big endian.
-            if !big {
-                value.reverse();
-            }
-            bytes.extend(value);
-        };
-        for [x, y] in SQUARE {
-            put(x.to_be_bytes().into());
-            put(f64::from(y).to_be_bytes().into());
-            for value in [0.0_f32, 0.0, 0.0, 1.0] {
-                put(value.to_be_bytes().into());
-            }
-            put(vec![255]);
-            put(x.to_be_bytes().into());
-            put(y.to_be_bytes().into());
-        }
-        put(vec![7]);
-        put(vec![4]);
-        for index in 0..4_i32 {
-            put(index.to_be_bytes().into());
-        }
-        bytes
-    }
-
-    #[test]
-    fn the_three_encodings_give_the_same_mesh() {
-        for bytes in [ascii(), binary(false), binary(true)] {
-            let file = load_bytes("m.ply", &bytes).unwrap();
-            let mesh = &file.parts[0].mesh;
-            let corners = SQUARE.map(Vec2::from);
-            assert_eq!(mesh.positions, corners.map(|p| p.extend(0.0)));
-            assert_eq!(mesh.texcoords, corners);
-            assert_eq!(mesh.normals, [Vec3::Z; 4]);
-            assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
-        }
-    }
-
-    #[test]
-    fn a_file_cut_off_anywhere_is_refused() {
-        for bytes in [ascii(), binary(false), binary(true)] {
-            // Without its last line break the text is still whole.
-            for length in 0..bytes.len() - 1 {
-                assert!(load_bytes("m.ply", &bytes[..length]).is_err(), "{length}");
-            }
-        }
-    }
-
-    fn replaced(from: &str, to: &str) -> LoadMeshErrorKind {
-        let text = String::from_utf8(ascii()).unwrap().replace(from, to);
-        load_bytes("m.ply", text.as_bytes()).unwrap_err().kind
-    }
-
-    #[test]
-    fn counts_beyond_the_file_are_refused_at_once() {
-        for count in ["4000000000", "18446744073709551615"] {
-            let kind = replaced("element vertex 4", &format!("element vertex {count}"));
-            assert!(kind.to_string().contains(count), "{kind}");
-            let empty = format!("element nothing {count}\nend_header");
-            assert!(
-                replaced("end_header", &empty)
-                    .to_string()
-                    .contains("nothing")
-            );
-        }
-        assert!(matches!(
-            replaced("7 4 0", "7 4000000000 0"),
-            LoadMeshErrorKind::Malformed { .. }
-        ));
-    }
-
-    #[test]
-    fn indices_out_of_range_name_the_face() {
-        for index in [4_i64, -1] {
-            let kind = replaced("7 4 0 1 2 3", &format!("7 4 0 1 2 {index}"));
-            assert!(
-                matches!(&kind, LoadMeshErrorKind::IndexOutOfRange { place, index: i, .. }
-                    if place == "face 0" && *i == index),
-                "{kind:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn headers_without_what_is_needed_are_refused() {
-        for (from, to) in [
-            ("property double y\n", ""),
-            ("property list uchar int vertex", "property int vertex"),
-            (
-                "property list uchar int vertex",
-                "property list uchar float vertex",
-            ),
-            ("format ascii 1.0\n", ""),
-            ("ply\n", "plx\n"),
-        ] {
-            let kind = replaced(from, to);
-            assert!(
-                matches!(kind, LoadMeshErrorKind::Malformed { .. }),
-                "{to:?}: {kind:?}"
-            );
-        }
-        let points = replaced("vertex_indices", "something_else");
-        assert!(matches!(points, LoadMeshErrorKind::NoFaces));
-    }
-}
+mod tests;

@@ -165,6 +165,11 @@ impl Reader<'_> {
                 _ => Wrap::Repeat,
             },
             uv: uv_transform(&info["extensions"]["KHR_texture_transform"]),
+            from: format!(
+                "{} of material {:?}",
+                pointer.rsplit('/').next().unwrap_or(pointer),
+                m["name"].as_str().unwrap_or("")
+            ),
         })
     }
 

@@ -1,7 +1,7 @@
 use super::super::tests::load_bytes;
-use super::super::{FileTexture, load_mesh};
+use super::super::{FileDetail, FileTexture, load_mesh};
 use super::*;
-use crate::surface::{MeshError, NormalMode};
+use crate::surface::{MeshBuilder, MeshError, NormalMode};
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
@@ -92,14 +92,7 @@ fn indices_out_of_range_name_the_line() {
         ("f 1 2 5", "vertex", 5, 4),
         ("f 1 2 0", "vertex", 0, 4),
         ("f 1 2 -5", "vertex", -5, 4),
-        ("f 1/1 2/1 3/1", "texture coordinate", 1, 0),
-        ("f 1//-9 2//-9 3//-9", "normal", -9, 0),
-        (
-            "f 1/-9223372036854775808 2/1 3/1",
-            "texture coordinate",
-            i64::MIN,
-            0,
-        ),
+        ("f 1 2 -9223372036854775808", "vertex", i64::MIN, 4),
     ] {
         match load(&format!("{face}\n")) {
             Err(LoadMeshErrorKind::IndexOutOfRange {
@@ -125,7 +118,6 @@ fn broken_statements_name_the_line() {
         "f 1 2 x\n",
         "f 1 2 3/\u{2f}/\u{2f}\n",
         "f 1 2 99999999999999999999\n",
-        "vt 1 1\nf 1/1 2 3\n",
         "v 1 2\n",
         "v 1 2 three\n",
         "v 1 2 3 0\n",
@@ -150,7 +142,7 @@ fn a_file_cut_off_anywhere_never_panics() {
 #[test]
 fn files_without_faces_or_text_are_refused() {
     assert!(matches!(load(""), Err(LoadMeshErrorKind::NoFaces)));
-    let binary = load_bytes("m.obj", b"v 0 0 0\n\xff\xfe\n").unwrap_err();
+    let binary = load_bytes("m.obj", b"v 0 0 0\n\xff\0\n").unwrap_err();
     assert!(matches!(
         binary.kind,
         LoadMeshErrorKind::NotText { line: 2 }
@@ -162,6 +154,138 @@ fn nan_is_left_to_the_builder_which_names_the_vertex() {
     let file = load_bytes("m.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let error = file.into_single_mesh().build(NormalMode::File).unwrap_err();
     assert!(matches!(error, MeshError::NotFinite { vertex: 1, .. }));
+}
+
+#[test]
+fn concave_polygons_are_cut_inside() {
+    let text = "v 0 0 0\nv 16 0 0\nv 4 3 0\nv 0 12 0\nvt 0 0\nf 2/1 3/1 4/1 1/1\n";
+    let file = load_bytes("m.obj", text.as_bytes()).unwrap();
+    let mesh = &file.parts[0].mesh;
+    let used: Vec<Vec<Vec3>> = mesh
+        .triangles
+        .iter()
+        .map(|t| t.map(|i| mesh.positions[i as usize]).to_vec())
+        .collect();
+    let (origin, inner) = (Vec3::ZERO, Vec3::new(4.0, 3.0, 0.0));
+    assert_eq!(used.len(), 2);
+    assert!(
+        used.iter()
+            .all(|t| t.contains(&origin) && t.contains(&inner))
+    );
+}
+
+#[test]
+fn polygons_that_cross_themselves_are_counted_once() {
+    let file = load("f 1 3 2 4\nf 1 3 2 4\n").unwrap();
+    assert_eq!(file.parts[0].mesh.triangles.len(), 4);
+    assert_eq!(file.warnings.len(), 1, "{:?}", file.warnings);
+    assert!(file.warnings[0].starts_with("2 polygons"));
+}
+
+#[test]
+fn normals_that_cannot_be_used_are_left_out_with_one_warning() {
+    let text = "vn 1 0 0\nvn nan 0 0\nf 1//1 2//0 3//1\nf 1//1 3//9 4//-7\nf 2//2 3//1 4//1\nf 1//1 2//1 4//1\n";
+    let file = load(text).unwrap();
+    assert_eq!(file.warnings.len(), 1, "{:?}", file.warnings);
+    assert!(
+        file.warnings[0].contains("3 faces, the first at line 7"),
+        "{}",
+        file.warnings[0]
+    );
+    let mesh = &file.parts[0].mesh;
+    assert_eq!(mesh.triangles.len(), 4);
+    let normal =
+        |triangle: usize, corner: usize| mesh.normals[mesh.triangles[triangle][corner] as usize];
+    assert_eq!(
+        [0, 1, 2].map(|c| normal(0, c)),
+        [Vec3::X, Vec3::ZERO, Vec3::X]
+    );
+    assert_eq!(
+        [0, 1, 2].map(|c| normal(1, c)),
+        [Vec3::X, Vec3::ZERO, Vec3::ZERO]
+    );
+    assert_eq!(normal(2, 0), Vec3::ZERO);
+}
+
+#[test]
+fn faces_keep_texture_coordinates_only_if_every_corner_has_them() {
+    let text = "vt 0 0\nf 1/1 2/0 3/1\nf 1/1 3 4/1\nf 1/1 2/1 4/2\nf 1/1 2/1 3/1\nf 1 2 3\n";
+    let file = load(text).unwrap();
+    assert_eq!(file.warnings.len(), 1, "{:?}", file.warnings);
+    assert!(
+        file.warnings[0].contains("3 faces, the first at line 6"),
+        "{}",
+        file.warnings[0]
+    );
+    let textured: Vec<_> = file
+        .parts
+        .iter()
+        .map(|p| (p.mesh.texcoords.len(), p.mesh.triangles.len()))
+        .collect();
+    assert_eq!(textured, [(0, 4), (3, 1)]);
+}
+
+#[test]
+fn old_line_ends_and_any_encoding_are_read() {
+    let text = "# caf\u{e9}\rv 0 0 0\rv 1 0 0\rv 0 1 0\ro \u{fc}ber\rf 1 2 3\r";
+    let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
+    let utf16: Vec<u8> = "\u{feff}"
+        .encode_utf16()
+        .chain(text.encode_utf16())
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    for bytes in [text.as_bytes(), &latin, &utf16] {
+        let file = load_bytes("m.obj", bytes).unwrap();
+        assert_eq!(file.parts[0].name, "\u{fc}ber");
+        assert_eq!(file.parts[0].mesh.triangles, [[0, 1, 2]]);
+    }
+}
+
+#[test]
+fn other_statements_are_passed_over() {
+    let mesh = only(
+        "s 1\ncstype bezier\ndeg 3\ncurv 0 1 1 2 3 4\nparm u 0 1\nend\nl 1 2\np 3\nlod 1\nshadow_obj x\nf 1 2 3\n\
+         call other.obj\ncsh echo\n\u{1f600} 7\n",
+    );
+    assert_eq!(mesh.triangles.len(), 1);
+}
+
+#[test]
+fn a_face_may_have_thousands_of_corners_over_many_lines() {
+    let n = 5000;
+    let mut text = String::new();
+    let mut face = "f".to_owned();
+    for i in 0..n {
+        let p = [1.0, 0.5][i % 2] * Vec2::from_angle(i as f32 * std::f32::consts::TAU / n as f32);
+        text += &format!("v {} {} 0\n", p.x, p.y);
+        face += &format!(" \\\n{}", i + 1);
+    }
+    let file = load_bytes("m.obj", (text + &face).as_bytes()).unwrap();
+    assert!(file.warnings.is_empty());
+    assert_eq!(file.parts[0].mesh.triangles.len(), n - 2);
+    assert_eq!(file.parts[0].mesh.positions.len(), n);
+}
+
+#[test]
+fn a_library_is_read_once_however_often_it_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("m.mtl"),
+        "newmtl a\nKd 2 x\nnewmtl b\nKd 1 x\n",
+    )
+    .unwrap();
+    let path = folder.path().join("m.obj");
+    let names = "mtllib m.mtl\nmtllib ./m.mtl m.mtl\nmtllib \"m.mtl\"\nmtllib M.MTL\n".repeat(100);
+    // Below its use is early enough.
+    std::fs::write(&path, format!("{SQUARE}usemtl a\nf 1 2 3\n{names}")).unwrap();
+    let file = load_mesh(&path).unwrap();
+    let [of_case, fault] = &file.warnings[..] else {
+        panic!("{:?}", file.warnings);
+    };
+    assert!(of_case.contains("M.MTL"), "{of_case}");
+    // Of the one material that is used.
+    assert!(fault.contains("m.mtl: line 2"), "{fault}");
+    assert_eq!(file.files, [folder.path().join("m.mtl"), path]);
 }
 
 #[test]
@@ -208,14 +332,108 @@ fn materials_part_the_faces_and_bring_their_maps() {
     let map = moss.displacement.as_ref().unwrap();
     assert_eq!(map.path, folder.path().join("moss.png"));
     assert_eq!(map.scale, Some(0.5));
+    assert_eq!(map.from, "bump of material \"moss\" in my lib.mtl");
+    // What does not displace shades, and what displaces does not shade once more.
+    let Some(FileDetail::Bump(bump)) = &moss.detail else {
+        panic!("{:?}", moss.detail);
+    };
+    assert_eq!(bump.factor, 0.5);
+    assert!(moss.clone().displaced().detail.is_none());
+    assert!(rock.clone().displaced().detail.is_some());
     assert!(file.parts[2].material.is_none());
+}
+
+#[test]
+fn names_are_the_same_in_every_encoding_and_with_quotes() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = b"newmtl gr\xfcn # old\rKd 0 1 0 # green\rmap_Kd \"gr\xfcn 1.png\" -s 2 2 1\rnewmtl my wood\r";
+    std::fs::write(folder.path().join("m.mtl"), library).unwrap();
+    std::fs::write(folder.path().join("gr\u{fc}n 1.png"), "x").unwrap();
+    let path = folder.path().join("m.obj");
+    let text =
+        format!("mtllib m.mtl\n{SQUARE}usemtl gr\u{fc}n\nf 1 2 3\nusemtl \"my wood\"\nf 1 3 4\n");
+    std::fs::write(&path, text).unwrap();
+    let file = load_mesh(&path).unwrap();
+    assert!(file.warnings.is_empty(), "{:?}", file.warnings);
+    let green = file.parts[0].material.as_ref().unwrap();
+    assert_eq!(green.base_color.factor, Vec3::Y);
+    let texture = green.base_color.texture.as_ref().unwrap();
+    assert_eq!(
+        texture.source,
+        FileTexture::Path(folder.path().join("gr\u{fc}n 1.png"))
+    );
+    assert_eq!(texture.uv.scale, Vec2::splat(2.0));
+    assert_eq!(texture.from, "map_Kd of material \"gr\u{fc}n\" in m.mtl");
+    assert_eq!(file.parts[1].material.as_ref().unwrap().name, "my wood");
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_and_pipes_are_no_libraries() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = std::process::Command::new("mkfifo")
+        .arg(folder.path().join("pipe.mtl"))
+        .status();
+    assert!(made.unwrap().success());
+    let path = folder.path().join("m.obj");
+    std::fs::write(
+        &path,
+        format!("mtllib /dev/zero\nmtllib pipe.mtl\n{SQUARE}usemtl a\nf 1 2 3\n"),
+    )
+    .unwrap();
+    let file = load_mesh(&path).unwrap();
+    assert_eq!(file.warnings.len(), 2, "{:?}", file.warnings);
+    assert_eq!(file.files, [path]);
+}
+
+/// A few thousand files with bytes changed, lost and doubled: each is read or refused.
+#[test]
+fn broken_files_are_read_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.obj");
+    let library = folder.path().join("m.mtl");
+    let obj = b"# made\nmtllib m.mtl\nv 0 0 0\nv 1 0 0 1\nv .2 .2 0 1 0 0\nv 0 1e0 -0\nvt 0.5\nvt 1 1 0\nvn 0 0 1\no a b\ng c\n\
+        usemtl a\ns off\nf 1/1/1 2/2/1 3/1/1 4/2/1\nusemtl \"b\"\nf -1//1 \\\n-2//1 -3//1\nl 1 2\nf 1 2 3 4 1 2\n";
+    let mtl = b"newmtl a\nKd 0.5 0.5 .5\nKs 1 1 1\nNs 10\nmap_Kd -s 2 2 1 \"x y.png\" -o 0 0 0\nd -halo 0.5\nillum 2\n\
+        newmtl b\nKe 1\nmap_Bump -bm 0.5 C:\\maps\\h.png -imfchan r\nnorm n.png\ndisp -mm 0 1 h.png\nTr 0.1\n";
+    let mut state = 1_u64;
+    let mut read = 0;
+    for round in 0..3000 {
+        let mut broken = [obj.to_vec(), mtl.to_vec()];
+        let bytes = &mut broken[round % 2];
+        for _ in 0..=round % 4 {
+            let mut next = |below: usize| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 33) as usize % below
+            };
+            let at = next(bytes.len());
+            let replacement = b"\0\n\r\\#/-. 0179evfn\xff\"";
+            match next(5) {
+                0 => drop(bytes.remove(at)),
+                1 => bytes.insert(at, replacement[next(replacement.len())]),
+                2 => bytes[at] = replacement[next(replacement.len())],
+                3 => bytes.truncate(at.max(8)),
+                _ => {
+                    let end = (at + next(40)).min(bytes.len());
+                    bytes.extend_from_within(at..end);
+                }
+            }
+        }
+        std::fs::write(&path, &broken[0]).unwrap();
+        std::fs::write(&library, &broken[1]).unwrap();
+        read += usize::from(load_mesh(&path).is_ok());
+    }
+    // Faults in the library refuse nothing.
+    assert!((1500..3000).contains(&read), "{read}");
 }
 
 #[test]
 fn materials_say_what_they_are_made_of() {
     let folder = tempfile::tempdir().unwrap();
     let library = "newmtl lamp\nKd 0 0 0\nKe 4 2 1\nnewmtl shiny\nKs 0.4 0.4 0.4\nNs 30\nNi 1.6\nd 0.75\nnewmtl chalk\nKs 0 0 0\nNs 30\n\
-        newmtl pane\nKd 0.2 0.2 0.2\nTf 0.5 1 0.5\nTr 0.9\nillum 7\nnewmtl pbr\nPr 0.3\nPm 1\nPc 0.5\nmap_Pr -imfchan g rough.png\nnorm n.png\n";
+        newmtl pane\nKd 0.2 0.2 0.2\nTf 0.5 1 0.5\nTr 0.9\nillum 7\nnewmtl pbr\nPr 0.3\nPm 1\nPc 0.5\nmap_Pr -imfchan g rough.png\nnorm n.png\nbump h.png\n";
     std::fs::write(folder.path().join("m.mtl"), library).unwrap();
     let names = ["lamp", "shiny", "chalk", "pane", "pbr"];
     let faces: String = names
@@ -247,5 +465,5 @@ fn materials_say_what_they_are_made_of() {
         (0.3, 1.0, 0.5)
     );
     assert_eq!(pbr.roughness.texture.as_ref().unwrap().1, "g");
-    assert!(pbr.detail.is_some());
+    assert!(matches!(pbr.detail, Some(FileDetail::NormalMap { .. })));
 }
