@@ -2,7 +2,7 @@
 //!
 //! One file gives one [`Part`] per material (and one more where only some faces of a material have texture
 //! coordinates). Within a part the faces stand in file order, so an OBJ of triangles with one material is
-//! one part whose triangle k is the file's face k. Larger polygons are cut into triangles ([`polygon`]).
+//! one part whose triangle k is the file's face k. Larger polygons are cut into triangles (polygon.rs).
 //! Texture coordinates come out with v up, whatever the format's habit.
 
 mod draco;
