@@ -77,7 +77,7 @@ pub enum SurfaceError {
     },
     /// More texels under a triangle than [`DisplacedSurface::MAX_TEXELS`].
     #[error(
-        "triangle {triangle} (from 0) is spread over {texels:e} texels of the map by its texture coordinates and their transform; \
+        "triangle {triangle} (from 0) is spread over {texels:.2e} texels of the map by its texture coordinates and their transform; \
          expected at most {max} from corner to corner",
         max = DisplacedSurface::MAX_TEXELS
     )]
