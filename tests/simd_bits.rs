@@ -1,6 +1,5 @@
 //! Kernels of every SIMD level give the same hits, bit for bit: pictures may be put together from any machines.
 
-#[allow(dead_code)] // a part is used
 #[path = "../benches/common/mod.rs"]
 mod common;
 #[path = "exact/kinds.rs"]
