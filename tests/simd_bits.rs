@@ -1,6 +1,5 @@
 //! Kernels of every SIMD level give the same hits, bit for bit: pictures may be put together from any machines.
 
-#[allow(dead_code)] // a part is used
 #[path = "../benches/common/mod.rs"]
 mod common;
 #[path = "exact/kinds.rs"]
@@ -21,7 +20,7 @@ use prismarch::ray::{Aabb, Footprint, Ray, RayPacket};
 use prismarch::surface::{DisplacedSurface, Seams};
 
 /// Primary rays per surface and march; as many again are from their hits, and as many packets.
-const RAYS: usize = if cfg!(debug_assertions) { 30 } else { 1000 };
+const RAYS: usize = if cfg!(debug_assertions) { 10 } else { 1000 };
 
 /// Exact hits, and cones from a hundredth of a texel wide to a good part of the map.
 const SPREADS: [f32; 5] = [0.0, 1e-5, 1e-3, 0.02, 0.2];

@@ -6,6 +6,7 @@
 mod common;
 mod oracle;
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use common::closed::{self, Closed};
@@ -157,6 +158,12 @@ fn corners_that_differ_by_rounding_leave_no_holes() {
         assert!(joined.positions > 0 && joined.farthest <= soup.rounding());
         let (mesh, _) = soup.build(NormalMode::File).unwrap();
         assert_eq!(mesh.triangles().len(), exact.triangles().len());
+        let distinct: HashSet<_> = mesh
+            .positions()
+            .iter()
+            .map(|p| p.to_array().map(f32::to_bits))
+            .collect();
+        assert_eq!(distinct.len(), exact.positions().len());
         let of_exact = exact.triangles().as_flattened();
         for (&i, &j) in mesh.triangles().as_flattened().iter().zip(of_exact) {
             let (i, j) = (i as usize, j as usize);

@@ -12,7 +12,8 @@ use glam::Vec4;
 mod sse2;
 
 /// a b + c in four lanes, and four more.
-#[inline(always)]
+// Without optimisation every copy would have a piece of the stack to itself: there are hundreds in a kernel.
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn mul_add(a: [Vec4; 2], b: [Vec4; 2], c: [Vec4; 2]) -> [Vec4; 2] {
     #[cfg(all(target_arch = "x86_64", not(target_feature = "fma")))]
     {
