@@ -102,8 +102,9 @@ typedef struct pm_closest {
  * then lanes are asked one by one, as they are wherever there is a filter:
  *   intersect8  fills hits[i] and sets bit i of the result for every lane i that hits.
  *   occluded8   sets bit i for every lane i that is occluded.
- * May be NULL, then nothing is near the geometry:
- *   closest     the nearest point no further than the radius; fills `found`, but for its geom and inst, and returns true. */
+ * May be NULL, then nothing is near the geometry, or nobody is told:
+ *   closest     the nearest point no further than the radius; fills `found`, but for its geom and inst, and returns true.
+ *   begin_filter, end_filter  called around a filter, on its thread; what the first returns is given to the second. */
 typedef struct pm_hit_test {
   void (*bounds)(const void *user, uint32_t prim, uint32_t step, float out[6]);
   bool (*intersect)(const void *user, uint32_t prim, const pm_ray *ray, pm_hit *hit);
@@ -111,6 +112,8 @@ typedef struct pm_hit_test {
   uint32_t (*intersect8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid, pm_hit hits[PM_LANES]);
   uint32_t (*occluded8)(const void *user, uint32_t prim, const pm_ray8 *rays, uint32_t valid);
   bool (*closest)(const void *user, uint32_t prim, const pm_point_query *query, pm_closest *found);
+  uint32_t (*begin_filter)(const void *user);
+  void (*end_filter)(const void *user, uint32_t begun);
 } pm_hit_test;
 
 /* A regular grid of width x height vertices, `stride` vertices from one row to the next: word for word RTCGrid. */

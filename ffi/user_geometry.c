@@ -97,7 +97,11 @@ static inline bool first_accepted(const query *q, pm_ray *ray, struct RTCHit *hi
         .hit = (struct RTCHitN *)hit,
         .N = 1,
     };
+    const pm_hit_test *test = &q->geometry->test;
+    const uint32_t begun = test->begin_filter ? test->begin_filter(q->geometry->test_user) : 0;
     q->invoke(q->args, &candidate);
+    if (test->end_filter)
+      test->end_filter(q->geometry->test_user, begun);
     if (valid == -1)
       return true;
     ray->tnear = at.t;

@@ -87,7 +87,7 @@ struct Map {
 };
 
 // A geometry of a surface; the bytes that the surface takes beside its map. The geometry keeps the surface, and that the map, which is
-// let go of here.
+// let go of here; where geometries keep nothing, the surface stays until the program ends.
 inline RTCGeometry geometry_of(RTCDevice device, const prismarch_surface_desc &desc, size_t *bytes) {
   prismarch_error error;
   prismarch_surface *surface;
@@ -95,7 +95,8 @@ inline RTCGeometry geometry_of(RTCDevice device, const prismarch_surface_desc &d
   check(prismarch_surface_create(&desc, &surface, &error), error);
   check(prismarch_geometry_create(device, surface, &geometry, &error), error);
   check(prismarch_surface_bytes(surface, bytes, &error), error);
-  prismarch_surface_release(surface);
+  if (prismarch_geometry_keeps_surface())
+    prismarch_surface_release(surface);
   prismarch_map_release(desc.map);
   return geometry;
 }

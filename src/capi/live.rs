@@ -5,6 +5,7 @@
 //! looks at, and one beside which a ray was in a hit test is refused.
 
 use std::cell::UnsafeCell;
+use std::mem::ManuallyDrop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicUsize, Ordering, fence};
 
@@ -241,6 +242,10 @@ fn traceable_lanes(rays: &RayPacket, valid: u8) -> u8 {
         .fold(0, |bits, lane| bits | 1 << lane)
 }
 
+/// How a filter's ray is within; 0 where nothing was begun.
+const PINNED: u32 = 1;
+const COUNTED: u32 = 2;
+
 impl HitTest for Live {
     fn len(&self) -> usize {
         self.enter().now().prisms().len()
@@ -308,6 +313,25 @@ impl HitTest for Live {
             Traced::Standing(prisms) => prisms.occluded8(prim, rays, valid),
             Traced::Moving(moving) => HitTest::occluded8(moving, prim, rays, valid),
         }
+    }
+
+    /// A ray that waits for its filter is in flight.
+    fn begin_filter(&self) -> u32 {
+        let within = ManuallyDrop::new(self.enter());
+        if within.pin.is_some() {
+            PINNED
+        } else {
+            COUNTED
+        }
+    }
+
+    fn end_filter(&self, begun: u32) {
+        let pin = match begun {
+            PINNED => Pin::again(Word::Surface, self.key()),
+            COUNTED => None,
+            _ => return,
+        };
+        drop(Within { live: self, pin });
     }
 
     fn closest(&self, prim: u32, query: &PointQuery) -> Option<ClosestPoint> {

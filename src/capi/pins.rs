@@ -8,7 +8,7 @@
 
 use std::cell::Cell;
 use std::marker::PhantomData;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering, compiler_fence, fence};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering, compiler_fence, fence};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// What is pinned: a number that is not 0.
@@ -23,7 +23,21 @@ pub enum Word {
 /// A thread's pins, in cache lines of its own.
 #[repr(align(128))]
 struct Slot {
-    words: [AtomicUsize; 2],
+    words: [Pinned; 2],
+}
+
+struct Pinned {
+    /// 0: nothing.
+    key: AtomicUsize,
+    /// How often its thread has pinned it; no other looks here.
+    depth: AtomicU32,
+}
+
+impl Pinned {
+    const NOTHING: Self = Self {
+        key: AtomicUsize::new(0),
+        depth: AtomicU32::new(0),
+    };
 }
 
 /// All slots there are, and those that no thread has at present.
@@ -52,7 +66,7 @@ impl Owner {
         let slot = slots.free.pop().unwrap_or_else(|| {
             // As many as threads at once, and used again: never freed.
             let new: &'static Slot = Box::leak(Box::new(Slot {
-                words: [const { AtomicUsize::new(0) }; 2],
+                words: [Pinned::NOTHING; 2],
             }));
             slots.all.push(new);
             new
@@ -78,7 +92,7 @@ fn claim() -> Option<&'static Slot> {
 
 /// Until it is dropped, other threads see what is pinned.
 pub struct Pin {
-    word: &'static AtomicUsize,
+    word: &'static Pinned,
     /// Stays on its thread.
     here: PhantomData<*const ()>,
 }
@@ -86,7 +100,11 @@ pub struct Pin {
 impl Drop for Pin {
     #[inline(always)]
     fn drop(&mut self) {
-        self.word.store(0, Ordering::Release);
+        let depth = self.word.depth.load(Ordering::Relaxed) - 1;
+        self.word.depth.store(depth, Ordering::Relaxed);
+        if depth == 0 {
+            self.word.key.store(0, Ordering::Release);
+        }
     }
 }
 
@@ -99,12 +117,26 @@ impl Pin {
             None => claim()?,
         };
         let word = &slot.words[word as usize];
-        if word.load(Ordering::Relaxed) != 0 {
+        let depth = word.depth.load(Ordering::Relaxed);
+        if depth != 0 && word.key.load(Ordering::Relaxed) != key {
             return None;
         }
-        word.store(key, Ordering::Relaxed);
+        word.depth.store(depth + 1, Ordering::Relaxed);
+        word.key.store(key, Ordering::Relaxed);
         light_barrier();
         Some(Self {
+            word,
+            here: PhantomData,
+        })
+    }
+}
+
+impl Pin {
+    /// A pin of this thread's that was forgotten, to be dropped at last.
+    pub fn again(word: Word, key: usize) -> Option<Self> {
+        let word = &OWN.get()?.words[word as usize];
+        let is_there = word.key.load(Ordering::Relaxed) == key;
+        is_there.then_some(Self {
             word,
             here: PhantomData,
         })
@@ -117,7 +149,7 @@ pub fn is_pinned(word: Word, key: usize) -> bool {
     heavy_barrier();
     let slots = SLOTS.lock().unwrap_or_else(PoisonError::into_inner);
     let mut all = slots.all.iter();
-    all.any(|slot| slot.words[word as usize].load(Ordering::Acquire) == key)
+    all.any(|slot| slot.words[word as usize].key.load(Ordering::Acquire) == key)
 }
 
 /// Whether [`heavy_barrier`] acts on all threads. Set within `ON_ALL_THREADS`'s initialisation: who has seen it true finds that true as well.
@@ -187,9 +219,12 @@ mod tests {
     fn a_thread_pins_one_of_a_kind_at_a_time_and_others_see_it() {
         let key = 0x1230;
         assert!(!is_pinned(Word::Surface, key));
+        let first = Pin::new(Word::Surface, key).unwrap();
+        assert!(Pin::new(Word::Surface, key + 16).is_none());
+        assert!(Pin::new(Word::Handle, key + 16).is_some());
+        // The same again, and whichever ends last.
         let pin = Pin::new(Word::Surface, key).unwrap();
-        assert!(Pin::new(Word::Surface, key).is_none());
-        assert!(Pin::new(Word::Handle, key).is_some());
+        drop(first);
         std::thread::scope(|scope| {
             scope.spawn(|| assert!(is_pinned(Word::Surface, key) && !is_pinned(Word::Handle, key)));
         });

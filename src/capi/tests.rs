@@ -214,7 +214,6 @@ fn an_update_beside_a_ray_is_refused_and_changes_nothing() {
         (edit(map), update(surface, &SQUARE)),
         (IN_FLIGHT, IN_FLIGHT)
     );
-    // Another look by the same thread is counted where it cannot be pinned.
     let again = live.enter();
     drop(within);
     assert_eq!(
@@ -222,6 +221,23 @@ fn an_update_beside_a_ray_is_refused_and_changes_nothing() {
         (IN_FLIGHT, IN_FLIGHT)
     );
     drop(again);
+    let begun = live.begin_filter();
+    assert_eq!(
+        (edit(map), update(surface, &SQUARE)),
+        (IN_FLIGHT, IN_FLIGHT)
+    );
+    // In a filter of another surface's a look cannot be pinned, and is counted.
+    let (other_map, other) = square();
+    let other_live = used::<Surface, _>(other).unwrap().live.clone();
+    let within = other_live.enter();
+    let nested = other_live.begin_filter();
+    assert_eq!((begun, nested, update(other, &SQUARE)), (1, 2, IN_FLIGHT));
+    other_live.end_filter(nested);
+    assert_eq!(update(other, &SQUARE), IN_FLIGHT);
+    drop(within);
+    assert_eq!(update(other, &SQUARE), OK);
+    free(other_map, other);
+    live.end_filter(begun);
     assert_eq!((edit(map), update(surface, &SQUARE)), (OK, OK));
     // A ray that comes and goes while an update is made.
     let watched = live.watch().unwrap();

@@ -185,7 +185,7 @@ impl RawGeometry {
         };
         let (address, record) = (handle.addr().get(), Record(record));
         geometries_mut().insert(address, record);
-        let unwatched = (!is_watched).then_some(Unwatched { address, record });
+        let unwatched = (!is_watched).then(|| Unwatched { address, record });
         Ok(Self {
             handle,
             faults,

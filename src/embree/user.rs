@@ -59,6 +59,17 @@ pub trait HitTest: Send + Sync {
         None
     }
 
+    /// A filter is about to be asked about a hit, by this thread: the ray is still on its way. What is returned goes to
+    /// [`end_filter`](Self::end_filter), which is called after it.
+    fn begin_filter(&self) -> u32 {
+        0
+    }
+
+    /// The filter has answered.
+    fn end_filter(&self, begun: u32) {
+        let _ = begun;
+    }
+
     /// [`intersect`](Self::intersect) for the lanes whose bits are set in `valid`, at least one. The other lanes may
     /// hold anything, and what is returned for them is not looked at.
     ///
@@ -173,6 +184,8 @@ impl<T: HitTest + 'static> Stored<T> {
         intersect8: Some(Self::on_intersect8),
         occluded8: Some(Self::on_occluded8),
         closest: Some(Self::on_closest),
+        begin_filter: Some(Self::on_begin_filter),
+        end_filter: Some(Self::on_end_filter),
     };
 
     pub(super) fn new(faults: Arc<Faults>, test: Arc<T>) -> Result<Arc<Self>, EmbreeError> {
@@ -277,6 +290,18 @@ impl<T: HitTest + 'static> Stored<T> {
         stored
             .caught(0, || stored.test.occluded8(prim, rays, valid))
             .into()
+    }
+
+    unsafe extern "C" fn on_begin_filter(user: *const c_void) -> u32 {
+        // SAFETY: as in `on_intersect`.
+        let stored = unsafe { &*user.cast::<Self>() };
+        stored.caught(0, || stored.test.begin_filter())
+    }
+
+    unsafe extern "C" fn on_end_filter(user: *const c_void, begun: u32) {
+        // SAFETY: as in `on_intersect`.
+        let stored = unsafe { &*user.cast::<Self>() };
+        stored.caught((), || stored.test.end_filter(begun));
     }
 
     unsafe extern "C" fn on_closest(

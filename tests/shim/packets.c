@@ -77,8 +77,9 @@ static uint32_t ball_occluded8(const void *user, uint32_t prim, const pm_ray8 *r
   return ball_intersect8(user, prim, rays, valid, hits);
 }
 
-static const pm_hit_test BALL = {ball_bounds, ball_intersect, ball_occluded, NULL, NULL, NULL};
-static const pm_hit_test PACKET_BALL = {ball_bounds, ball_intersect, ball_occluded, ball_intersect8, ball_occluded8, NULL};
+static const pm_hit_test BALL = {.bounds = ball_bounds, .intersect = ball_intersect, .occluded = ball_occluded};
+static const pm_hit_test PACKET_BALL = {
+    .bounds = ball_bounds, .intersect = ball_intersect, .occluded = ball_occluded, .intersect8 = ball_intersect8, .occluded8 = ball_occluded8};
 
 /* Lets leaving crossings pass and drops entering ones. */
 static bool leaving(const void *user, const pm_ray *ray, const pm_scene_hit *hit) {

@@ -56,6 +56,7 @@ void packets16(void);
 #if EMBREE_MAJOR == 3
 void pointers(void);
 #endif
+void unfiltered(void);
 void instances(void);
 void odd_rays(void);
 void watertight(void);
@@ -64,12 +65,20 @@ void edits(void);
 void motion(void);
 void lifetimes(void);
 void threads(void);
+void updates_beside_rays(void);
+void handles_beside_releases(void);
 void memory(void);
 /* In queries.c: */
 void closest(void);
+void uncommitted(void);
 void point_queries(void);
 void files(void);
 /* In misuse.c: */
 void misuse(void);
+void handles(void);
+void geometries(void);
+void descriptions(void);
+void counts(void);
+void limits(void);
 
 #endif

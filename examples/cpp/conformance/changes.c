@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <pthread.h>
+#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -111,7 +112,9 @@ void lifetimes(void) {
     }
     if (order & 1)
       prismarch_map_release(map);
-    if (order & 2)
+    /* Where geometries do not keep it, it goes last. */
+    const bool early = order & 2 && prismarch_geometry_keeps_surface();
+    if (early)
       prismarch_surface_release(surface);
     for (int s = 0; s < 4; s++) {
       const float o[3] = {3, 0.1f, 0.1f}, dir[3] = {-1, 0, 0};
@@ -122,7 +125,7 @@ void lifetimes(void) {
     }
     for (int k = 0; k < 2; k++)
       rtcReleaseDevice(devices[k]);
-    if (!(order & 2))
+    if (!early)
       prismarch_surface_release(surface);
     if (!(order & 1))
       prismarch_map_release(map);
@@ -179,6 +182,135 @@ void threads(void) {
     EXPECT(t[k].hits == 3000);
   }
   free_world(&w);
+  end();
+}
+
+/* Written and read by several threads. */
+static int is_done, is_waiting;
+static int get(const int *flag) { return __atomic_load_n(flag, __ATOMIC_ACQUIRE); }
+static void set(int *flag, int value) { __atomic_store_n(flag, value, __ATOMIC_RELEASE); }
+
+static void *trace_until_done(void *user) {
+  tracing *t = user;
+  for (int i = 0; !get(&is_done); i++) {
+    const float a = 0.002f * (float)i;
+    const float o[3] = {3 * cosf(a), 3 * sinf(a), 0.1f}, d[3] = {-cosf(a), -sinf(a), 0};
+    struct RTCRayHit q = ray_at(o, d);
+    intersect1(t->scene, &q, NULL);
+    struct RTCRayHit s = ray_at(o, d);
+    occluded1(t->scene, &s.ray, NULL);
+    t->hits += is_hit(&q) && s.ray.tfar < 0 && q.ray.tfar > 1 && q.ray.tfar < 3;
+  }
+  return NULL;
+}
+
+/* Keeps its ray in flight until it is told. */
+static void wait_in_filter(const struct RTCFilterFunctionNArguments *args) {
+  (void)args;
+  set(&is_waiting, 1);
+  while (!get(&is_done))
+    sched_yield();
+}
+
+static void *trace_one(void *user) {
+  tracing *t = user;
+  const float o[3] = {3, 0.1f, 0.1f}, d[3] = {-1, 0, 0};
+  struct RTCRayHit q = ray_at(o, d);
+  intersect1(t->scene, &q, NULL);
+  t->hits += is_hit(&q);
+  return NULL;
+}
+
+void updates_beside_rays(void) {
+  begin("updates beside rays: PRISMARCH_ERROR_IN_FLIGHT or done, never half");
+  world w = new_world(RTC_SCENE_FLAG_NONE);
+  const ball b = new_ball(1), larger = new_ball(1.2f);
+  prismarch_vertices v[2];
+  memset(v, 0, sizeof v);
+  v[0].positions.data = larger.positions, v[0].normals.data = larger.normals;
+  v[1].positions.data = b.positions, v[1].normals.data = b.normals;
+  static uint16_t texels[SIDE * SIDE];
+  const prismarch_texels t = {texels, PRISMARCH_TEXEL_U16, 0, 0};
+
+  /* While one ray waits in its filter. */
+  tracing one = {w.scene, 0};
+  pthread_t thread;
+  rtcSetGeometryIntersectFilterFunction(w.geometry, wait_in_filter);
+  rtcCommitGeometry(w.geometry);
+  rtcCommitScene(w.scene);
+  set(&is_done, 0);
+  set(&is_waiting, 0);
+  pthread_create(&thread, NULL, trace_one, &one);
+  while (!get(&is_waiting))
+    sched_yield();
+  prismarch_error e;
+  bool needed = false;
+  EXPECT(prismarch_surface_update_vertices(w.surface, 0, &v[0], &needed, &e) == PRISMARCH_ERROR_IN_FLIGHT && *e.message);
+  EXPECT(prismarch_map_update(w.map, 0, 0, SIDE, SIDE, &t, &needed, &e) == PRISMARCH_ERROR_IN_FLIGHT);
+  EXPECT(!needed);
+  set(&is_done, 1);
+  pthread_join(thread, NULL);
+  EXPECT(one.hits == 1);
+  EXPECT(prismarch_surface_update_vertices(w.surface, 0, &v[1], &needed, &e) == PRISMARCH_OK && needed);
+  rtcSetGeometryIntersectFilterFunction(w.geometry, NULL);
+  rtcCommitGeometry(w.geometry);
+  rtcCommitScene(w.scene);
+
+  /* Beside two threads that do not stop. */
+  enum { ROUNDS = 300 };
+  tracing all[2] = {{w.scene, 0}, {w.scene, 0}};
+  pthread_t threads[2];
+  set(&is_done, 0);
+  for (int k = 0; k < 2; k++)
+    pthread_create(&threads[k], NULL, trace_until_done, &all[k]);
+  for (int i = 0; i < ROUNDS; i++) {
+    const prismarch_status moved = prismarch_surface_update_vertices(w.surface, 0, &v[i & 1], NULL, &e);
+    const prismarch_status edited = prismarch_map_update(w.map, 0, 0, SIDE, SIDE, &t, NULL, &e);
+    EXPECT(moved == PRISMARCH_OK || moved == PRISMARCH_ERROR_IN_FLIGHT);
+    EXPECT(edited == PRISMARCH_OK || edited == PRISMARCH_ERROR_IN_FLIGHT);
+  }
+  set(&is_done, 1);
+  for (int k = 0; k < 2; k++) {
+    pthread_join(threads[k], NULL);
+    EXPECT(all[k].hits > 0);
+  }
+  EXPECT(prismarch_surface_update_vertices(w.surface, 0, &v[1], NULL, &e) == PRISMARCH_OK);
+  EXPECT(prismarch_surface_check(w.surface, &e) == PRISMARCH_OK);
+  free_world(&w);
+  end();
+}
+
+static void *interpolate_until_gone(void *surface) {
+  prismarch_point p;
+  prismarch_status status;
+  do {
+    set(&is_waiting, 1);
+    status = prismarch_interpolate(surface, 20, 0.5f, 0.5f, 0, &p, NULL);
+  } while (status == PRISMARCH_OK);
+  return status == PRISMARCH_ERROR_HANDLE ? surface : NULL;
+}
+
+void handles_beside_releases(void) {
+  begin("a handle that another thread releases is whole to the end of the call");
+  const ball b = new_ball(1);
+  for (int round = 0; round < 20; round++) {
+    prismarch_map *map = new_map();
+    const prismarch_surface_desc d = desc_of(&b, map);
+    prismarch_surface *surface = surface_of(&d);
+    pthread_t threads[2];
+    set(&is_waiting, 0);
+    for (int k = 0; k < 2; k++)
+      pthread_create(&threads[k], NULL, interpolate_until_gone, surface);
+    while (!get(&is_waiting))
+      sched_yield();
+    EXPECT(prismarch_surface_release(surface) == PRISMARCH_OK);
+    for (int k = 0; k < 2; k++) {
+      void *told = NULL;
+      pthread_join(threads[k], &told);
+      EXPECT(told == surface);
+    }
+    EXPECT(prismarch_map_release(map) == PRISMARCH_OK);
+  }
   end();
 }
 

@@ -17,18 +17,27 @@ int main(void) {
 #if EMBREE_MAJOR == 3
   pointers();
 #endif
+  unfiltered();
   instances();
   odd_rays();
   watertight();
   edits();
   motion();
   closest();
+  uncommitted();
   point_queries();
   files();
   lifetimes();
   threads();
+  updates_beside_rays();
+  handles_beside_releases();
   memory();
   misuse();
+  handles();
+  geometries();
+  descriptions();
+  counts();
+  limits();
   printf("%d of the cases failed\n", failures);
   return failures != 0;
 }

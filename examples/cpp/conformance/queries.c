@@ -24,6 +24,30 @@ void closest(void) {
   end();
 }
 
+void uncommitted(void) {
+  begin("prismarch_closest of a scene that is not committed: a status");
+  world w = new_world(RTC_SCENE_FLAG_NONE);
+  RTCScene scene = rtcNewScene(w.device);
+  const float position[3] = {3, 0, 0};
+  bool found;
+  prismarch_closest_point p;
+  prismarch_error e;
+  EXPECT(prismarch_closest(NULL, position, 10, 0, &found, &p, &e) == PRISMARCH_ERROR_NULL);
+  EXPECT(prismarch_closest(scene, position, 10, 0, &found, &p, &e) == PRISMARCH_ERROR_EMBREE && *e.message);
+  const unsigned id = rtcAttachGeometry(scene, w.geometry);
+  EXPECT(prismarch_closest(scene, position, 10, 0, &found, &p, &e) == PRISMARCH_ERROR_EMBREE);
+  rtcCommitScene(scene);
+  EXPECT(prismarch_closest(scene, position, 10, 0, &found, &p, &e) == PRISMARCH_OK && found);
+  /* Changed since. */
+  rtcDetachGeometry(scene, id);
+  EXPECT(prismarch_closest(scene, position, 10, 0, &found, &p, &e) == PRISMARCH_ERROR_EMBREE);
+  rtcCommitScene(scene);
+  EXPECT(prismarch_closest(scene, position, 10, 0, &found, &p, &e) == PRISMARCH_OK && !found);
+  rtcReleaseScene(scene);
+  free_world(&w);
+  end();
+}
+
 typedef struct nearest {
   const prismarch_surface *surface;
   int calls;

@@ -200,6 +200,71 @@ PACKET_CASE(4)
 PACKET_CASE(8)
 PACKET_CASE(16)
 
+/* Bits of lanes that are occluded; `hits` has the packet's hits. */
+static unsigned trace8(RTCScene scene, const struct RTCRayHit rays[8], struct RTCRayHit8 *hits) {
+  int valid[8] __attribute__((aligned(64)));
+  struct RTCRay8 shadows;
+  memset(hits, 0, sizeof *hits);
+  for (unsigned i = 0; i < 8; i++) {
+    const struct RTCRay *r = &rays[i].ray;
+    hits->ray.org_x[i] = r->org_x, hits->ray.org_y[i] = r->org_y, hits->ray.org_z[i] = r->org_z;
+    hits->ray.dir_x[i] = r->dir_x, hits->ray.dir_y[i] = r->dir_y, hits->ray.dir_z[i] = r->dir_z;
+    hits->ray.tfar[i] = r->tfar, hits->ray.mask[i] = r->mask;
+    hits->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    valid[i] = -1;
+  }
+  shadows = hits->ray;
+  PACKET(8, valid, scene, hits);
+#if EMBREE_MAJOR == 3
+  struct RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded8(valid, scene, &context, &shadows);
+#else
+  rtcOccluded8(valid, scene, &shadows, NULL);
+#endif
+  unsigned bits = 0;
+  for (unsigned i = 0; i < 8; i++)
+    bits |= (unsigned)(shadows.tfar[i] < 0) << i;
+  return bits;
+}
+
+void unfiltered(void) {
+  begin("has_filter = false: the same hits, alone and in packets; filters are not asked");
+  world w = new_world(RTC_SCENE_FLAG_NONE);
+  const ball b = new_ball(1);
+  prismarch_surface_desc d = desc_of(&b, w.map);
+  d.has_filter = false;
+  prismarch_surface *surface = surface_of(&d);
+  RTCGeometry geometry = geometry_of(w.device, surface);
+  rtcSetGeometryIntersectFilterFunction(geometry, only_leaving);
+  rtcCommitGeometry(geometry);
+  RTCScene scene = rtcNewScene(w.device);
+  rtcAttachGeometry(scene, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene);
+  for (int round = 0; round < 300; round++) {
+    struct RTCRayHit rays[8];
+    for (unsigned i = 0; i < 8; i++)
+      rays[i] = i && round % 2 ? ray_beside(&rays[0]) : random_ray();
+    struct RTCRayHit8 filtered, free;
+    const unsigned dark[2] = {trace8(w.scene, rays, &filtered), trace8(scene, rays, &free)};
+    EXPECT(dark[0] == dark[1]);
+    for (unsigned i = 0; i < 8; i++) {
+      struct RTCRayHit one = rays[i], other = rays[i];
+      intersect1(w.scene, &one, NULL);
+      intersect1(scene, &other, NULL);
+      EXPECT(one.ray.tfar == other.ray.tfar && one.hit.primID == other.hit.primID && one.hit.u == other.hit.u);
+      EXPECT(free.hit.geomID[i] == one.hit.geomID && (dark[0] >> i & 1) == (unsigned)is_hit(&one));
+      EXPECT(fabsf(free.ray.tfar[i] - one.ray.tfar) <= 2e-7f * one.ray.tfar);
+      EXPECT(!is_hit(&one) || (free.hit.primID[i] == one.hit.primID && fabsf(free.hit.u[i] - one.hit.u) <= 1e-6f));
+    }
+  }
+  rtcReleaseScene(scene);
+  prismarch_surface_release(surface);
+  free_world(&w);
+  end();
+}
+
 #if EMBREE_MAJOR == 3 /* Embree 4 has no streams. */
 enum { LONGEST = 37 };
 
