@@ -10,9 +10,20 @@
  * Every function that can fail returns a status, never aborts, never lets an exception or a panic out, and writes what is
  * wrong to *error where `error` is not NULL. On failure outputs are not written and nothing has changed.
  *
+ * Handles of maps and surfaces are numbers that are looked up in the table of live ones before anything is read: a wild, stale or foreign
+ * pointer, or a handle of the other kind, is PRISMARCH_ERROR_HANDLE in every function. None comes back in the life of the process. A
+ * geometry is looked up in the same way where a function takes one. Devices, scenes and all other pointers are the caller's word: NULL and what
+ * is not aligned is told, a wild one is not.
+ *
  * Threads: functions on different handles may run at once. On one handle, those that take a pointer to const may run at
  * once with each other and with rays; the others (updates) must run alone, with no ray in flight and no commit running of any
- * scene that has a geometry of that surface or map. Retain and release may be called from any thread.
+ * scene that has a geometry of that surface or map. An update beside a ray, a commit or another call on the same surface is
+ * PRISMARCH_ERROR_IN_FLIGHT, in every build, where one of prismarch's functions (a hit test, a box, the wait for a filter) ran while it was made;
+ * it never takes effect under one. Retain and release may be called from any thread, also while another uses the handle: its call
+ * ends well.
+ *
+ * Sizes: structs that callers fill and that may grow have a struct_size (prismarch_surface_desc). All others, those that prismarch fills among
+ * them (prismarch_error, prismarch_point, prismarch_closest_point), stay as they are; what they lack will be another function's.
  */
 #ifndef PRISMARCH_H
 #define PRISMARCH_H
@@ -115,8 +126,8 @@ prismarch_status prismarch_map_size(const prismarch_map *map, uint32_t *width, u
 prismarch_status prismarch_map_update(prismarch_map *map, uint32_t x, uint32_t y, uint32_t width, uint32_t height,
                                       const prismarch_texels *texels, bool *commit_needed, prismarch_error *error);
 prismarch_status prismarch_map_retain(prismarch_map *map);
-/* NULL is allowed. The last release frees it, once no surface has it. One too many is PRISMARCH_ERROR_HANDLE (unless a new handle has
- * got the same address). */
+/* NULL is allowed. The last release frees it, once no surface has it and the calls have ended that use it. One too many is
+ * PRISMARCH_ERROR_HANDLE. */
 prismarch_status prismarch_map_release(prismarch_map *map);
 
 /* Surfaces ------------------------------------------------------------------------------------------ */
@@ -161,7 +172,9 @@ typedef struct prismarch_vertices {
 
 /* Filled by prismarch_surface_desc_init; then set what is wanted. */
 typedef struct prismarch_surface_desc {
-  size_t struct_size; /* sizeof(prismarch_surface_desc) */
+  /* sizeof(prismarch_surface_desc) as the caller was compiled. An older one is taken, and what it lacks has its default; a newer one is, if
+   * all is zero that the library does not know. */
+  size_t struct_size;
 
   uint32_t vertex_count;
   uint32_t primitive_count;
@@ -202,7 +215,8 @@ prismarch_status prismarch_surface_desc_init_sized(prismarch_surface_desc *desc,
 prismarch_status prismarch_surface_desc_init(prismarch_surface_desc *desc);
 #define prismarch_surface_desc_init(desc) prismarch_surface_desc_init_sized((desc), sizeof(prismarch_surface_desc))
 
-/* Triangles without area are never hit; primIDs stay the caller's. */
+/* Triangles without area are never hit; primIDs stay the caller's. Embree takes no coordinates beyond 1.844e18: a surface that reaches
+ * further is PRISMARCH_ERROR_DATA, here and in updates. */
 prismarch_status prismarch_surface_create(const prismarch_surface_desc *desc, prismarch_surface **surface,
                                           prismarch_error *error);
 /* Moves the vertices of a time step (0 where nothing moves), as many as there were. Geometries of the surface need rtcCommitGeometry
@@ -215,7 +229,7 @@ prismarch_status prismarch_surface_check(prismarch_surface *surface, prismarch_e
 /* Bytes of the surface without its map. */
 prismarch_status prismarch_surface_bytes(const prismarch_surface *surface, size_t *bytes, prismarch_error *error);
 prismarch_status prismarch_surface_retain(prismarch_surface *surface);
-/* As prismarch_map_release. Geometries keep the surface: it may be released before they are. */
+/* As prismarch_map_release. Where prismarch_geometry_keeps_surface() the surface may be released before its geometries are. */
 prismarch_status prismarch_surface_release(prismarch_surface *surface);
 
 /* Interpolation ------------------------------------------------------------------------------------- */
@@ -241,19 +255,25 @@ prismarch_status prismarch_interpolate_n(const prismarch_surface *surface, const
 
 /* Embree -------------------------------------------------------------------------------------------- */
 
-/* A new geometry of the device, with one reference that the caller owns; NULL on failure is never written. It keeps the surface until
- * Embree destroys it: everything may be released in any order. Not yet committed.
+/* Whether geometries keep their surface until Embree destroys them: then everything may be released in any order. That takes notice of a
+ * geometry's end, which there is on Linux with glibc. Elsewhere (macOS, musl) it is false, and the rule is plain: a surface must not be
+ * released for the last time before all scenes and references of the caller's have let go of its geometries. */
+bool prismarch_geometry_keeps_surface(void);
+/* A new geometry of the device, with one reference that the caller owns; NULL on failure is never written. Not yet committed.
  *
  * Free for the caller: masks, build quality, intersection and occlusion filters, attaching to any number of scenes, instancing,
  * rtcRetainGeometry, rtcReleaseGeometry. Set by prismarch and not to be changed: the primitive count, time step count, the
- * bounds, intersect, occluded and point query functions, and Embree's user data pointer; for your own see below. */
+ * bounds, intersect, occluded and point query functions, and Embree's user data pointer; for your own see below.
+ *
+ * Rays whose origin or direction is NaN or beyond 1.844e18 meet nothing, if Embree lets them get here: builds with assertions, Debian's among
+ * them, end the process in rtcIntersect and rtcOccluded before any geometry is asked. Such rays are the caller's to keep back. */
 prismarch_status prismarch_geometry_create(struct RTCDeviceTy *device, prismarch_surface *surface,
                                            struct RTCGeometryTy **geometry, prismarch_error *error);
-/* In place of rtcSetGeometryUserData and rtcGetGeometryUserData. Filters get this pointer as args->geometryUserPtr.
- * `geometry` must be one that prismarch made. */
+/* In place of rtcSetGeometryUserData and rtcGetGeometryUserData. Filters get this pointer as args->geometryUserPtr. A geometry that prismarch has
+ * not made, or that was destroyed, is PRISMARCH_ERROR_HANDLE, and has the data NULL (where prismarch_geometry_keeps_surface() is false, a
+ * destroyed one only after its surface). */
 prismarch_status prismarch_geometry_set_user_data(struct RTCGeometryTy *geometry, void *data, prismarch_error *error);
 void *prismarch_geometry_user_data(struct RTCGeometryTy *geometry);
-bool prismarch_geometry_keeps_surface(void);
 
 /* The nearest point of the surfaces in a scene. */
 typedef struct prismarch_closest_point {
@@ -264,7 +284,9 @@ typedef struct prismarch_closest_point {
 } prismarch_closest_point;
 
 /* rtcPointQuery over the surfaces attached to a committed scene itself (instances in it are not entered; other geometries are not asked).
- * *found: whether there is a point no further than `radius`; only then *point is written. */
+ * *found: whether there is a point no further than `radius`, which may be infinite; only then *point is written. A scene that was not committed
+ * since it was last changed is PRISMARCH_ERROR_EMBREE (the device's error function is told, too); a wild one cannot be told.
+ * Positions beyond 1.844e18 are PRISMARCH_ERROR_ARGUMENT. */
 prismarch_status prismarch_closest(struct RTCSceneTy *scene, const float position[3], float radius, float time, bool *found,
                                    prismarch_closest_point *point, prismarch_error *error);
 

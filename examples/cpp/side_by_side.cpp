@@ -82,6 +82,7 @@ RTCGeometry displaced(RTCDevice device, const Torus &torus, const Map &map, size
   desc.texcoords.data = torus.texcoords.data();
   desc.map = map.create();
   desc.scale = SCALE;
+  desc.has_filter = false;
   return geometry_of(device, desc, bytes);
 }
 

@@ -69,6 +69,7 @@ RTCGeometry by_prismarch(RTCDevice device, const Ground &ground, const Map &map,
   desc.texcoords.data = ground.texcoords.data();
   desc.map = map.create();
   desc.scale = SCALE;
+  desc.has_filter = false;
   return geometry_of(device, desc, bytes);
 }
 
