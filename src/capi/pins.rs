@@ -34,10 +34,12 @@ struct Pinned {
 }
 
 impl Pinned {
-    const NOTHING: Self = Self {
-        key: AtomicUsize::new(0),
-        depth: AtomicU32::new(0),
-    };
+    fn nothing() -> Self {
+        Self {
+            key: AtomicUsize::new(0),
+            depth: AtomicU32::new(0),
+        }
+    }
 }
 
 /// All slots there are, and those that no thread has at present.
@@ -66,7 +68,7 @@ impl Owner {
         let slot = slots.free.pop().unwrap_or_else(|| {
             // As many as threads at once, and used again: never freed.
             let new: &'static Slot = Box::leak(Box::new(Slot {
-                words: [Pinned::NOTHING; 2],
+                words: [Pinned::nothing(), Pinned::nothing()],
             }));
             slots.all.push(new);
             new

@@ -423,38 +423,27 @@ fn descriptions_of_other_versions_are_read() {
         size_of::<c::prismarch_surface_desc>(),
     );
     let map = new_map();
-    // An older program's: what it lacks may be anything.
-    let mut old = SQUARE.desc(map);
-    for struct_size in first..size {
-        old.struct_size = struct_size;
-        old.reserved = [255; 7];
-        let (status, surface) = create(&old);
-        assert_eq!((struct_size, status), (struct_size, OK));
-        // SAFETY: a handle.
-        assert_eq!(
-            unsafe { super::surface::prismarch_surface_release(surface) },
-            OK
-        );
-        if struct_size == first {
-            let has_filter = |surface| used::<Surface, _>(surface).unwrap().options.has_filter;
-            let (_, surface) = create(&c::prismarch_surface_desc {
-                has_filter: false,
-                ..old
-            });
-            assert!(has_filter(surface));
-            // SAFETY: a handle.
-            unsafe { super::surface::prismarch_surface_release(surface) };
-            let new = c::prismarch_surface_desc {
-                has_filter: false,
-                ..SQUARE.desc(map)
-            };
-            let (_, surface) = create(&new);
-            assert!(!has_filter(surface));
-            // SAFETY: a handle.
-            unsafe { super::surface::prismarch_surface_release(surface) };
-            break;
-        }
+    let release = |surface| {
+        // SAFETY: no pointer but a handle.
+        let status = unsafe { super::surface::prismarch_surface_release(surface) };
+        assert_eq!(status, OK);
+    };
+    let has_filter = |desc: &c::prismarch_surface_desc| {
+        let (status, surface) = create(desc);
+        assert_eq!(status, OK);
+        let has_filter = used::<Surface, _>(surface).unwrap().options.has_filter;
+        release(surface);
+        has_filter
+    };
+    let mut desc = SQUARE.desc(map);
+    desc.has_filter = false;
+    for struct_size in first..=size {
+        desc.struct_size = struct_size;
+        assert_eq!(has_filter(&desc), struct_size == first);
     }
+    // What an older program's lacks may be anything.
+    (desc.struct_size, desc.reserved) = (first, [255; 7]);
+    assert!(has_filter(&desc));
     // A newer one's.
     #[repr(C)]
     struct Newer(c::prismarch_surface_desc, [u8; 24]);
@@ -462,8 +451,7 @@ fn descriptions_of_other_versions_are_read() {
     newer.0.struct_size = size + 24;
     let (status, surface) = create(&raw const newer.0);
     assert_eq!(status, OK);
-    // SAFETY: a handle.
-    unsafe { super::surface::prismarch_surface_release(surface) };
+    release(surface);
     newer.1[23] = 1;
     assert_eq!(create(&raw const newer.0).0, ARGUMENT);
     // None's.

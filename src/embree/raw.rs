@@ -257,6 +257,7 @@ pub fn version() -> u32 {
 /// A pointer of the caller's own, which filters of the geometry are given as its user data. False where the address is not that of a live
 /// geometry that a [`RawGeometry`] has made; it is looked up, and nothing is read through it. (Where [ends are not noticed](notices_ends) the
 /// address of a destroyed geometry is taken for a live one.)
+#[allow(clippy::not_unsafe_ptr_arg_deref)] // `data` is kept, and never read through
 pub fn set_caller_data(geometry: NonNull<c_void>, data: *mut c_void) -> bool {
     let live = geometries();
     let record = live.get(&geometry.addr().get());
