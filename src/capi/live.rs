@@ -229,14 +229,20 @@ impl Shut<'_> {
     }
 }
 
-/// Whether Embree takes such a ray. A caller's own rays are whatever the caller says.
+/// Whether Embree takes numbers so large. A caller's own rays are whatever the caller says.
 #[inline(always)]
 fn is_traceable(ray: &Ray) -> bool {
-    let limit = glam::Vec3::splat(LARGEST_COORDINATE);
-    ray.is_valid() && (ray.origin.abs().cmple(limit) & ray.direction.abs().cmple(limit)).all()
+    // Without the sign, the bits of floats are in the floats' order; infinity and NaN come last.
+    let magnitude = |x: f32| x.to_bits() & 0x7fff_ffff;
+    let origin = ray.origin.to_array().map(magnitude);
+    let direction = ray.direction.to_array().map(magnitude);
+    let largest = |[x, y, z]: [u32; 3]| x.max(y).max(z);
+    largest(origin).max(largest(direction)) <= LARGEST_COORDINATE.to_bits()
 }
 
+/// The lanes that packets may have.
 fn traceable_lanes(rays: &RayPacket, valid: u8) -> u8 {
+    let is_traceable = |ray: &Ray| is_traceable(ray) && ray.is_valid();
     lanes_of(valid)
         .filter(|&lane| is_traceable(&rays.ray(lane)))
         .fold(0, |bits, lane| bits | 1 << lane)
