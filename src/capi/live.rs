@@ -14,7 +14,7 @@ use super::error::Failure;
 use super::pins::{self, Pin, Word};
 use crate::embree::HitTest;
 use crate::prism::{MovingPrisms, PrismHit, Prisms};
-use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
+use crate::ray::{Aabb, MAX_COORDINATE, Ray, RayPacket, lanes_of};
 use crate::surface::{ClosestPoint, DisplacedSurface, PointQuery, TexelRect};
 
 /// The prisms of a surface as it is.
@@ -232,10 +232,22 @@ impl Shut<'_> {
     }
 }
 
-/// The lanes whose rays are within the limits: a caller's own rays are whatever the caller says.
+/// Whether Embree takes numbers so large. A caller's own rays are whatever the caller says.
+#[inline(always)]
+fn is_traceable(ray: &Ray) -> bool {
+    // Without the sign, the bits of floats are in the floats' order; infinity and NaN come last.
+    let magnitude = |x: f32| x.to_bits() & 0x7fff_ffff;
+    let origin = ray.origin.to_array().map(magnitude);
+    let direction = ray.direction.to_array().map(magnitude);
+    let largest = |[x, y, z]: [u32; 3]| x.max(y).max(z);
+    largest(origin).max(largest(direction)) <= MAX_COORDINATE.to_bits()
+}
+
+/// The lanes that packets may have.
 fn traceable_lanes(rays: &RayPacket, valid: u8) -> u8 {
+    let is_traceable = |ray: &Ray| is_traceable(ray) && ray.is_valid();
     lanes_of(valid)
-        .filter(|&lane| rays.ray(lane).is_valid())
+        .filter(|&lane| is_traceable(&rays.ray(lane)))
         .fold(0, |bits, lane| bits | 1 << lane)
 }
 
@@ -261,7 +273,7 @@ impl HitTest for Live {
     }
 
     fn intersect(&self, prim: u32, ray: &Ray) -> Option<PrismHit> {
-        if !ray.is_valid() {
+        if !is_traceable(ray) {
             return None;
         }
         let within = self.enter();
@@ -273,7 +285,7 @@ impl HitTest for Live {
     }
 
     fn occluded(&self, prim: u32, ray: &Ray) -> bool {
-        if !ray.is_valid() {
+        if !is_traceable(ray) {
             return false;
         }
         let within = self.enter();

@@ -189,15 +189,20 @@ void descriptions(void) {
 
   /* The first version's, in no more memory than that took; its function writes no further. */
   const size_t first = offsetof(prismarch_surface_desc, has_filter);
-  prismarch_surface_desc *old = malloc(first);
-  EXPECT((prismarch_surface_desc_init)(old) == PRISMARCH_OK && old->struct_size == first && old->scale == 1);
-  memcpy(old, &present, first);
-  old->struct_size = first;
+  unsigned char *const memory = malloc(first);
+  prismarch_surface_desc *const old = (prismarch_surface_desc *)(void *)memory;
+  size_t told = 0;
+  EXPECT((prismarch_surface_desc_init)(old) == PRISMARCH_OK);
+  memcpy(&told, memory, sizeof told);
+  EXPECT(told == first);
+  memcpy(memory, &present, first);
+  memcpy(memory, &first, sizeof first);
   EXPECT(prismarch_surface_create(old, &surface, &e) == PRISMARCH_OK);
   prismarch_surface_release(surface);
-  old->struct_size = first - 1;
+  told = first - 1;
+  memcpy(memory, &told, sizeof told);
   EXPECT(prismarch_surface_create(old, &surface, &e) == PRISMARCH_ERROR_ARGUMENT && *e.message);
-  free(old);
+  free(memory);
 
   /* A later one's. */
   unsigned char later[sizeof present + 16];
