@@ -66,6 +66,16 @@ impl Assets {
         })
     }
 
+    /// The pictures that have been read, some perhaps more than once.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let channels = self.heights.iter().chain(&self.scalars);
+        let channels = channels.map(|((path, ..), _)| path);
+        let colors = self.colors.iter().map(|((path, ..), _)| path);
+        let environments = self.environments.iter().map(|(path, _)| path);
+        let all = channels.chain(colors).chain(environments);
+        all.map(PathBuf::as_path)
+    }
+
     /// The displacement maps, in the order of their first use.
     pub fn into_maps(self) -> Vec<MapFile> {
         let maps = self.heights.into_iter();
