@@ -14,10 +14,9 @@ const USAGE: i32 = 2;
 const OUTPUT: i32 = 4;
 
 /// All kinds of files that a scene reads.
-const INPUTS: [&str; 8] = [
+const INPUTS: [&str; 7] = [
     "scene.toml",
     "quad.obj",
-    "quad.mtl",
     "by_mtl.png",
     "flat.png",
     "paint.png",
@@ -142,10 +141,35 @@ fn links_of_either_kind_lead_to_the_files_of_the_scene() {
 fn a_query_keeps_its_rays_mesh_and_map() {
     let folder = folder();
     let query = "query --mesh quad.obj --map flat.png --scale 0.2 --rays rays.csv -o";
-    for input in ["rays.csv", "quad.obj", "quad.mtl", "flat.png"] {
+    for input in ["rays.csv", "quad.obj", "flat.png"] {
         refused(&folder, &format!("{query} {input}"), USAGE, &[input]);
     }
     done(&folder, &format!("{query} hits.csv"));
+}
+
+#[test]
+fn files_that_a_mesh_file_names_are_kept() {
+    let folder = folder();
+    let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    folder.put("corners.bin", corners.map(f32::to_le_bytes).as_flattened());
+    folder.put(
+        "corners.gltf",
+        r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": "corners.bin", "byteLength": 36}]}"#,
+    );
+    let rest = "--map flat.png --scale 0.2 --rays rays.csv -o";
+    for (mesh, input) in [
+        ("quad.obj", "quad.mtl"),
+        ("corners.gltf --texcoords planar", "corners.bin"),
+    ] {
+        let query = format!("query --mesh {mesh} {rest}");
+        refused(&folder, &format!("{query} {input}"), USAGE, &[input]);
+        done(&folder, &format!("{query} hits.csv"));
+    }
+    let stats = "render scene.toml -o a.png --stats quad.mtl";
+    refused(&folder, stats, USAGE, &["quad.mtl"]);
 }
 
 #[test]
@@ -391,6 +415,7 @@ fn inputs_that_are_no_files_are_refused_at_once() {
         }
         fs::rename(folder.path(name), folder.path("pipe")).unwrap();
     }
+    fs::remove_file(folder.path("pipe")).unwrap();
     for input in ["/dev/zero", "inner"] {
         for run in [
             format!("render {input} -o a.png"),
@@ -409,49 +434,48 @@ fn inputs_that_are_no_files_are_refused_at_once() {
 fn a_demo_replaces_what_it_made_and_nothing_else() {
     let folder = Folder::empty();
     let small = "demo asteroid --out rock --size 16x12 --spp 1 --map-size";
-    let made = [
+    let path = |name: &str| format!("rock/{name}");
+    let read = |name: &str| fs::read(folder.path(&path(name))).unwrap();
+    let names = [
         "asteroid.obj",
         "asteroid.png",
         "asteroid.toml",
         "asteroid_height.png",
     ];
-    done(&folder, &format!("{small} 256"));
-    // What it made itself it replaces: again, in another size, without some of it.
+    // What it made itself it replaces, also by something else, also without some of it.
     done(&folder, &format!("{small} 256"));
     fs::remove_file(folder.path("rock/asteroid.obj")).unwrap();
     done(&folder, &format!("{small} 300"));
-    done(&folder, "demo orb --out rock --no-render --map-size 256");
-    let read = |name: &str| fs::read(folder.path(&format!("rock/{name}"))).unwrap();
-    for name in made {
-        let path = format!("rock/{name}");
-        let mine = [&read(name)[..], b"# mine"].concat();
-        folder.put(&path, &mine);
-        let before = made.map(read);
-        refused(&folder, &format!("{small} 256"), USAGE, &[&path, "--force"]);
-        assert!(made.map(read) == before, "{name}");
-        // A picture that is not written is not asked for.
-        let plain = format!("demo asteroid --out rock --map-size 256 --no-render");
-        if name == "asteroid.png" {
-            done(&folder, &plain);
-            assert_eq!(read(name), mine);
-        } else {
-            refused(&folder, &plain, USAGE, &[&path]);
-        }
-        done(&folder, &format!("{small} 256 --force"));
-        assert_ne!(read(name), mine);
-        done(&folder, &format!("{small} 256"));
+    let changed = ["asteroid.png", "asteroid.toml"];
+    for name in changed {
+        folder.put(&path(name), [&read(name)[..], b"# mine"].concat());
     }
-    // Other files in the folder are nobody's business, and no demo ever made these.
-    let foreign = Folder::empty();
-    fs::create_dir(foreign.path("asteroid")).unwrap();
-    foreign.put("asteroid/asteroid.toml", "mine");
-    foreign.put("asteroid/notes.txt", "mine");
+    let before = names.map(read);
+    let words = changed.map(path);
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let words = [&words[..], &["--force"]].concat();
+    refused(&folder, &format!("{small} 256"), USAGE, &words);
+    assert!(names.map(read) == before);
+    done(&folder, &format!("{small} 256 --force"));
+    assert!(changed.iter().all(|name| !read(name).ends_with(b"# mine")));
+    // A picture that is not written may be what it wants.
+    folder.put(&path("asteroid.png"), "mine");
+    done(&folder, "demo --out rock --map-size 256 --no-render");
+    assert_eq!(read("asteroid.png"), b"mine");
+}
+
+#[test]
+fn a_demo_asks_where_nothing_is_its_own() {
+    let folder = Folder::empty();
+    fs::create_dir(folder.path("asteroid")).unwrap();
+    folder.put("asteroid/asteroid.toml", "mine");
+    folder.put("asteroid/notes.txt", "mine");
     let run = "demo --no-render --map-size 256";
-    refused(&foreign, run, USAGE, &["asteroid/asteroid.toml"]);
-    assert_eq!(foreign.text("asteroid/asteroid.toml"), "mine");
-    assert!(!foreign.path("asteroid/asteroid.obj").exists());
-    done(&foreign, &format!("{run} --force"));
-    assert_eq!(foreign.text("asteroid/notes.txt"), "mine");
-    foreign.put("asteroid/.prismarch-demo", "mine");
-    refused(&foreign, run, USAGE, &[".prismarch-demo"]);
+    refused(&folder, run, USAGE, &["asteroid/asteroid.toml"]);
+    assert_eq!(folder.text("asteroid/asteroid.toml"), "mine");
+    assert!(!folder.path("asteroid/asteroid.obj").exists());
+    done(&folder, &format!("{run} --force"));
+    assert_eq!(folder.text("asteroid/notes.txt"), "mine");
+    folder.put("asteroid/.prismarch-demo", "mine");
+    refused(&folder, run, USAGE, &[".prismarch-demo"]);
 }

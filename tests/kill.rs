@@ -14,12 +14,12 @@ const KILLS: usize = 100;
 /// A whole run after this many that were killed.
 const WHOLE: usize = 10;
 /// Samples per pixel after each progressive pass.
-const PASSES: [u32; 5] = [1, 2, 4, 8, 16];
-const RENDER: &str = "render scene.toml --size 64x48 --threads 1 --quiet";
+const PASSES: [u32; 4] = [1, 2, 4, 8];
+const RENDER: &str = "render scene.toml --size 32x24 --threads 1 --quiet";
 
 /// The usual folder with bumps, so that pictures of two seeds differ.
 fn folder() -> Folder {
-    let folder = Folder::with_quad();
+    let folder = Folder::in_memory();
     let noise = |i: u32| (i.wrapping_mul(0x9e37_79b9) >> 16) as u16;
     let heights: Vec<u16> = (0..32 * 32).map(noise).collect();
     write_png_gray16(&folder.path("flat.png"), 32, 32, &heights).unwrap();
@@ -146,7 +146,7 @@ fn a_killed_render_leaves_the_old_picture_or_a_new_one() {
     let victim = Victim {
         folder: &folder,
         output: "a.exr",
-        run: &|i| format!("{RENDER} -o a.exr --spp 16 --progressive --seed {}", i % 2),
+        run: &|i| format!("{RENDER} -o a.exr --spp 8 --progressive --seed {}", i % 2),
         prepare: &|| (),
         is_new: &|i, found| is_pass(found, &expected[i % 2]),
     };
@@ -157,7 +157,7 @@ fn a_killed_render_leaves_the_old_picture_or_a_new_one() {
 fn a_killed_run_leaves_what_the_next_goes_on_with() {
     let folder = folder();
     let expected = passes(&folder, 0);
-    let run = format!("{RENDER} -o a.exr --spp 16 --progressive --resume");
+    let run = format!("{RENDER} -o a.exr --spp 8 --progressive --resume");
     let is_partial = || {
         let picture = read_exr(&folder.path("a.exr")).unwrap();
         let partial = ("prismarch/partial".to_owned(), "true".to_owned());
@@ -185,7 +185,7 @@ fn a_killed_run_leaves_what_the_next_goes_on_with() {
     };
     victim.kill_many();
     done(&folder, &run);
-    assert!(is_pass(&pixels(&folder, "a.exr"), &expected[4..]));
+    assert!(is_pass(&pixels(&folder, "a.exr"), &expected[3..]));
 }
 
 #[test]
@@ -194,8 +194,8 @@ fn a_killed_merge_leaves_the_old_picture_or_the_new_one() {
     let merge = |seed| format!("merge {seed}a.exr {seed}b.exr -o merged.exr");
     let expected = [0, 1].map(|seed| {
         let part = format!("{RENDER} --spp 2 --seed {seed}");
-        done(&folder, &format!("{part} --crop 0,0,20,48 -o {seed}a.exr"));
-        done(&folder, &format!("{part} --crop 20,0,64,48 -o {seed}b.exr"));
+        done(&folder, &format!("{part} --crop 0,0,12,24 -o {seed}a.exr"));
+        done(&folder, &format!("{part} --crop 12,0,32,24 -o {seed}b.exr"));
         done(&folder, &merge(seed));
         pixels(&folder, "merged.exr")
     });
