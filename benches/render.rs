@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use common::timing::{Query, Times, option, trace, word};
-use prismarch::demo::{DEMOS, Demo};
+use prismarch::demo::{DEMOS, Demo, WriteOptions};
 use prismarch::embree::{
     Device, DeviceOptions, EmbreeOptions, EmbreeTracer, Geometry, HitTest, Instance, Scene,
     SceneBuilder, SceneOptions, TriangleGeometry, UserGeometry,
@@ -50,7 +50,12 @@ fn main() {
 }
 
 fn load(demo: &Demo, folder: &std::path::Path) -> Loaded {
-    let scene = demo.write(folder, option("--map", demo.map_size));
+    let options = WriteOptions {
+        map_size: option("--map", demo.map_size),
+        force: false,
+        picture: false,
+    };
+    let scene = demo.write(folder, options);
     let scene = scene.expect("the demo can be written");
     Loaded::from_file(&scene).expect("the demo is a scene")
 }

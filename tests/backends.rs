@@ -356,7 +356,7 @@ fn a_transform_without_an_inverse_is_refused() {
 
 #[cfg(feature = "embree")]
 mod embree {
-    use prismarch::demo::DEMOS;
+    use prismarch::demo::{DEMOS, WriteOptions};
     use prismarch::embree::{EmbreeOptions, EmbreeTracer};
     use prismarch::scene::{Camera, Loaded};
     use rayon::prelude::*;
@@ -417,9 +417,13 @@ mod embree {
     fn demos_look_the_same() {
         DEMOS.par_iter().for_each(|demo| {
             let folder = tempfile::tempdir().unwrap();
-            let scene = Loaded::from_file(&demo.write(folder.path(), 512).unwrap())
-                .unwrap()
-                .scene;
+            let options = WriteOptions {
+                map_size: 512,
+                force: false,
+                picture: false,
+            };
+            let scene = demo.write(folder.path(), options).unwrap();
+            let scene = Loaded::from_file(&scene).unwrap().scene;
             let world = scene.world().unwrap();
             let (bvh, embree) = both(&world);
             let camera = camera_rays(&scene.camera, 160, 120);

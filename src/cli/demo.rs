@@ -1,7 +1,7 @@
 //! `prismarch demo`: writes a ready scene and renders it.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::engine::EngineArgs;
 use super::error::CliError;
@@ -9,12 +9,14 @@ use super::film::FilmArgs;
 use super::march::MarchArgs;
 use super::picture::Target;
 use super::render::Job;
-use crate::demo::{DEMOS, Demo};
+use crate::demo::{DEMOS, Demo, WriteOptions, digest};
+use crate::files::Outputs;
 
 /// Make a ready scene and a picture of it
 ///
 /// Mesh, displacement map, colours and scene file are made by the program itself and written into a folder, then the
-/// scene is rendered. All files are there to be changed and rendered again with `prismarch render`.
+/// scene is rendered. All files are there to be changed and rendered again with `prismarch render`. A file that was changed, or
+/// that no demo made, is replaced with --force only.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -29,6 +31,9 @@ pub struct Args {
     /// Folder for the files, made if it is missing [default: NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Replace files in the folder that no demo made, or that were changed since
+    #[arg(long)]
+    force: bool,
     /// List the demos
     #[arg(long)]
     list: bool,
@@ -60,13 +65,34 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if !args.quiet {
         eprintln!("making {} in {}", demo.name, folder.display());
     }
-    let scene = demo.write(&folder, map_size)?;
+    let options = WriteOptions {
+        map_size,
+        force: args.force,
+        picture: !args.no_render,
+    };
+    let scene = demo.write(&folder, options)?;
     if args.no_render {
         return writeln!(std::io::stdout(), "{}", scene.display()).map_err(CliError::stdout);
     }
+    let picture = folder.join(demo.picture());
+    let before = digest(&picture).ok();
+    let rendered = render(args, &scene, &picture);
+    // A run that was interrupted has written its picture, too; one that failed before has left the old one.
+    let kept = if rendered.is_ok() || digest(&picture).ok() != before {
+        demo.keep_picture(&folder)
+    } else {
+        Ok(())
+    };
+    rendered.and(kept.map_err(CliError::from))
+}
+
+fn render(args: &Args, scene: &Path, picture: &Path) -> Result<(), CliError> {
+    let mut outputs = Outputs::new();
     Job {
-        target: Target::new(&scene.with_extension("png"))?,
-        scene: &scene,
+        target: Target::new(picture, &mut outputs)?,
+        is_named: true,
+        outputs,
+        scene,
         film: &args.film,
         set: &[],
         integrator: None,

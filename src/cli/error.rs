@@ -110,6 +110,8 @@ impl CliError {
         match self {
             Self::Usage(_) | Self::PictureFormat { .. } => USAGE,
             Self::Scene(error) if error.is_override() => USAGE,
+            Self::Output(error) if error.is_usage() => USAGE,
+            Self::Demo(WriteDemoError::Foreign { .. }) => USAGE,
             Self::Scene(_)
             | Self::Asset(_)
             | Self::March(_)

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::engine::EngineArgs;
 use super::error::CliError;
 use super::memory::Memory;
+use crate::files::Outputs;
 use crate::prism::{March, PrismOptions, Step};
 use crate::scene::{Loaded, MapFile, ObjectShape};
 
@@ -35,7 +36,10 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.check_backend()?;
     args.engine.start_threads()?;
+    let outputs = Outputs::new();
+    outputs.spare([&args.scene])?;
     let loaded = Loaded::from_file(&args.scene)?;
+    outputs.spare(&loaded.files)?;
     super::warn(&loaded.warnings);
     let world = loaded.scene.world()?;
     let engine = args.engine.build(&world)?;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::error::CliError;
 use super::film::ToneArgs;
 use super::picture::Target;
+use crate::files::Outputs;
 use crate::render::film::{FrameFile, merge};
 use crate::scene::Film;
 
@@ -36,7 +37,9 @@ pub struct Args {
 
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let target = Target::new(&args.output)?;
+    let mut outputs = Outputs::new();
+    let target = Target::new(&args.output, &mut outputs)?;
+    outputs.spare(&args.parts)?;
     let Some(FrameFile { frame, info }) = merge(&args.parts)? else {
         return Err(CliError::Usage("no files to merge".into()));
     };

@@ -1,9 +1,9 @@
-//! Where a picture goes: checked before anything is rendered, written when all is done.
+//! Where a picture goes: chosen before anything is rendered, written when all is done.
 
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use crate::files::output;
+use crate::files::{OutputError, Outputs};
 use crate::image::write_png_rgb8;
 use crate::render::film::{Frame, FrameInfo};
 use crate::render::to_srgb8;
@@ -23,8 +23,8 @@ enum Format {
 }
 
 impl Target {
-    /// Checks that the ending is known and that the folder is there and lets itself be written.
-    pub fn new(path: &Path) -> Result<Self, CliError> {
+    /// One more of the outputs, which must be able to be written; the ending must be known.
+    pub fn new(path: &Path, outputs: &mut Outputs) -> Result<Self, CliError> {
         let ending = path.extension().unwrap_or_default().to_string_lossy();
         let format = match &ending.to_lowercase()[..] {
             "png" => Format::Png,
@@ -39,11 +39,35 @@ impl Target {
                 });
             }
         };
-        output::check(path)?;
+        outputs.add(path)?;
         Ok(Self {
             path: path.to_owned(),
             format,
         })
+    }
+
+    /// A target for a picture that was given no name: a PNG called like the scene, or nearly so where that file is read-only, one
+    /// of the `outputs` or one of the files that the run reads. The outputs themselves must be none of these.
+    pub fn of_scene(scene: &Path, outputs: &Outputs, inputs: &[PathBuf]) -> Result<Self, CliError> {
+        let mut tried = 0;
+        loop {
+            let path = name_of_scene(scene, tried);
+            let mut outputs = outputs.clone();
+            match outputs.add(&path).and_then(|()| outputs.spare(inputs)) {
+                Ok(()) => {
+                    let format = Format::Png;
+                    return Ok(Self { path, format });
+                }
+                Err(OutputError::Protected { .. }) => tried += 1,
+                Err(taken) if taken.is_usage() => tried += 1,
+                Err(other) => return Err(other.into()),
+            }
+        }
+    }
+
+    /// Whether this is the first name that [`Target::of_scene`] looks at.
+    pub fn is_usual_of(&self, scene: &Path) -> bool {
+        self.path == name_of_scene(scene, 0)
     }
 
     /// The path as given.
@@ -73,4 +97,15 @@ impl Target {
         write_png_rgb8(&self.path, width, height, &pixels, &texts)?;
         Ok(())
     }
+}
+
+/// `rock.png`, `rock.render.png`, `rock.render2.png`, ...
+fn name_of_scene(scene: &Path, tried: usize) -> PathBuf {
+    let mut name = scene.file_stem().unwrap_or_default().to_owned();
+    match tried {
+        0 => name.push(".png"),
+        1 => name.push(".render.png"),
+        _ => name.push(format!(".render{tried}.png")),
+    }
+    name.into()
 }

@@ -13,7 +13,7 @@ use super::hits;
 use super::march::MarchArgs;
 use super::parse;
 use super::rays::{Layout, RayError, RayReader, Row};
-use crate::files::output;
+use crate::files::{Outputs, output};
 use crate::image::Channel;
 use crate::prism::PrismOptions;
 use crate::ray::Cone;
@@ -149,13 +149,19 @@ impl From<WrapKind> for Wrap {
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.check_backend()?;
-    let to_stdout = args.output == Path::new("-");
+    let to_stdout = is_standard(&args.output);
+    let mut outputs = Outputs::new();
     if !to_stdout {
-        output::check(&args.output)?;
+        outputs.add(&args.output)?;
     }
+    if is_standard(&args.rays) {
+        outputs.spare_stdin()?;
+    }
+    outputs.spare(args.files())?;
     args.engine.start_threads()?;
     let mut rays = RayReader::open(&args.rays)?;
     let mut loaded = args.load()?;
+    outputs.spare(&loaded.files)?;
     super::warn(&loaded.warnings);
     args.march.apply(&mut loaded.scene, args.jitter.is_some())?;
     args.override_seams(&mut loaded.scene);
@@ -195,6 +201,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 impl Args {
+    /// What is read, as far as the command line tells.
+    fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        let rays = Some(&self.rays).filter(|rays| !is_standard(rays));
+        let SurfaceArgs { mesh, map, .. } = &self.surface;
+        [rays, self.scene.as_ref(), mesh.as_ref(), map.as_ref()]
+            .into_iter()
+            .flatten()
+    }
+
     fn load(&self) -> Result<Loaded, CliError> {
         let SurfaceArgs {
             mesh, map, scale, ..
@@ -234,6 +249,11 @@ impl Args {
             }
         }
     }
+}
+
+/// Whether standard input or output is meant.
+fn is_standard(path: &Path) -> bool {
+    path == Path::new("-")
 }
 
 /// Rays traced at once: enough for all threads, little memory.

@@ -17,7 +17,7 @@ use super::parse;
 use super::picture::Target;
 use super::progress::Progress;
 use super::stats::{Clock, Seconds, Stats};
-use crate::files::output;
+use crate::files::Outputs;
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
 use crate::render::{Control, Outcome, RenderInput};
 use crate::scene::{Aov, AovSet, Film, Integrator, Loaded, Scene, View};
@@ -42,7 +42,8 @@ Examples:
 pub struct Args {
     /// Scene file (TOML)
     scene: PathBuf,
-    /// Picture, .png or .exr [default: the scene's name with .png, in the current folder]
+    /// Picture, .png or .exr [default: the scene's name with .png, in the current folder, or .render.png where the scene
+    /// reads that file]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -78,6 +79,10 @@ pub struct Job<'a> {
     pub scene: &'a Path,
     /// Where the picture goes.
     pub target: Target,
+    /// The user named it; else another name is taken where the scene reads that file.
+    pub is_named: bool,
+    /// What is written, the picture if it is named.
+    pub outputs: Outputs,
     /// Film settings that win over the scene's.
     pub film: &'a FilmArgs,
     /// Values that win over the scene's, and lose to other options.
@@ -101,19 +106,21 @@ pub struct Job<'a> {
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.check_backend()?;
-    let output = args.output.clone().unwrap_or_else(|| {
-        let mut name = args.scene.file_stem().unwrap_or_default().to_owned();
-        name.push(".png");
-        name.into()
-    });
-    let target = Target::new(&output)?;
+    let mut outputs = Outputs::new();
     if let Some(stats) = &args.stats {
-        output::check(stats)?;
+        outputs.add(stats)?;
     }
+    let target = match &args.output {
+        Some(path) => Target::new(path, &mut outputs)?,
+        None => Target::of_scene(&args.scene, &outputs, &[])?,
+    };
+    outputs.spare([&args.scene])?;
     args.engine.start_threads()?;
     Job {
         scene: &args.scene,
         target,
+        is_named: args.output.is_some(),
+        outputs,
         film: &args.film,
         set: &args.set,
         integrator: args.integrator.as_deref(),
@@ -129,9 +136,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 
 impl Job<'_> {
     /// Loads, builds, renders, writes, and says so in one line.
-    pub fn run(&self) -> Result<(), CliError> {
+    pub fn run(mut self) -> Result<(), CliError> {
         let mut clock = Clock::start();
         let mut loaded = Loaded::from_file_with(self.scene, self.set)?;
+        self.spare(&loaded.files)?;
         super::warn(&loaded.warnings);
         self.film.apply(&mut loaded.scene.film)?;
         if let Some(integrator) = self.integrator.and_then(Integrator::named) {
@@ -195,6 +203,22 @@ impl Job<'_> {
             }),
             None => self.say(&stats.summary()),
         }
+    }
+
+    /// Fails if what is written was read. A picture that has no name given takes another then.
+    fn spare(&mut self, files: &[PathBuf]) -> Result<(), CliError> {
+        self.outputs.spare(files)?;
+        if self.is_named {
+            return Ok(());
+        }
+        self.target = Target::of_scene(self.scene, &self.outputs, files)?;
+        if !self.target.is_usual_of(self.scene) {
+            let path = self.target.path().display();
+            super::warn(&[format!(
+                "the picture is {path}: the file of the scene's name and .png is read-only, or this run reads it"
+            )]);
+        }
+        Ok(())
     }
 
     /// The frame to be rendered, new or as it was left; `None` if there is nothing left to do.

@@ -10,6 +10,7 @@ mod drape;
 #[cfg(test)]
 mod laws;
 mod leather;
+mod manifest;
 mod noise;
 mod orb;
 mod paint;
@@ -21,7 +22,8 @@ mod teaser;
 mod write;
 
 use crate::surface::MeshBuilder;
-pub use write::WriteDemoError;
+pub(crate) use manifest::digest;
+pub use write::{WriteDemoError, WriteOptions};
 
 /// What a demo is made of, in memory.
 pub struct DemoFiles {

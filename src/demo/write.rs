@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use super::manifest::{Manifest, digest};
 use super::{Demo, DemoFiles};
-use crate::files::output::{self, OutputError};
-use crate::image::{write_png_gray16, write_png_rgb8};
+use crate::files::output::{self, OutputError, Staged};
+use crate::image::{stage_png_gray16, stage_png_rgb8};
 use crate::surface::MeshBuilder;
 
 /// Half the side of the floor, a square at y = 0 around the origin.
@@ -24,45 +25,165 @@ pub enum WriteDemoError {
         /// Why.
         source: io::Error,
     },
+    /// Files have the names of the demo's, and are not as a demo left them.
+    #[error(
+        "{} not as prismarch demo left them: --force replaces them",
+        list(files)
+    )]
+    Foreign {
+        /// The files.
+        files: Vec<PathBuf>,
+    },
     /// A file cannot be written.
     #[error(transparent)]
     File(#[from] OutputError),
 }
 
+fn list(files: &[PathBuf]) -> String {
+    let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
+    let verb = if names.len() == 1 { "is" } else { "are" };
+    format!("{} {verb}", names.join(", "))
+}
+
+/// How a demo is written.
+#[derive(Clone, Copy, Debug)]
+pub struct WriteOptions {
+    /// Texels across and up of its largest map.
+    pub map_size: usize,
+    /// Replace whatever has the names of its files.
+    pub force: bool,
+    /// The picture `NAME.png` will be written, too.
+    pub picture: bool,
+}
+
 impl Demo {
-    /// Makes the demo with maps of `map_size` x `map_size` and writes its files into `folder`, which is made if it is
-    /// missing. Returns the scene file, which is written last.
+    /// Makes the demo and writes its files into `folder`, which is made if it is missing. Returns the scene file.
+    ///
+    /// A hidden file in the folder keeps what they contain, so that the next run knows them.
     ///
     /// # Errors
     ///
-    /// [`WriteDemoError`], which names the file or folder. Files written before it stay.
-    pub fn write(&self, folder: &Path, map_size: usize) -> Result<PathBuf, WriteDemoError> {
+    /// [`WriteDemoError`], which names the files or the folder; [`WriteDemoError::Foreign`] unless `force` is set. Up to the last
+    /// moment no file has been replaced; then each is replaced by itself.
+    pub fn write(&self, folder: &Path, options: WriteOptions) -> Result<PathBuf, WriteDemoError> {
         std::fs::create_dir_all(folder).map_err(|source| WriteDemoError::Folder {
             folder: folder.to_owned(),
             source,
         })?;
-        let file = |ending: &str| folder.join(format!("{}{ending}", self.name));
-        let scene = file(".toml");
+        let scene = folder.join(format!("{}.toml", self.name));
         // Making the maps takes a while: an unwritable folder is found before.
         output::check(&scene)?;
-        let files: DemoFiles = (self.make)(map_size);
-        write_obj(&file(".obj"), &files.mesh)?;
-        let size = files.map_size;
-        write_png_gray16(&file("_height.png"), size, size, &files.heights)?;
+        let files = self.stage(folder, &(self.make)(options.map_size))?;
+        let mut manifest = Manifest::read(folder);
+        if !options.force {
+            let picture = options.picture.then(|| self.picture());
+            let names = files.iter().map(|file| &file.name[..]);
+            let foreign = manifest.foreign(folder, names.chain(picture.as_deref()));
+            if !foreign.is_empty() {
+                return Err(WriteDemoError::Foreign { files: foreign });
+            }
+        }
+        // Before the files: a run that is killed between them leaves none, old or new, that the next does not know.
+        for file in &files {
+            manifest.add(&file.name, &file.digest);
+        }
+        manifest.write(folder)?;
+        for file in files {
+            file.staged.commit()?;
+            manifest.set(&file.name, &file.digest);
+        }
+        manifest.write(folder)?;
+        Ok(scene)
+    }
+
+    /// What the picture of the demo is called.
+    pub fn picture(&self) -> String {
+        format!("{}.png", self.name)
+    }
+
+    /// Notes that the picture in `folder` is one of the demo's files.
+    ///
+    /// # Errors
+    ///
+    /// [`WriteDemoError::File`].
+    pub fn keep_picture(&self, folder: &Path) -> Result<(), WriteDemoError> {
+        let name = self.picture();
+        let digest = digest(&folder.join(&name)).map_err(|source| OutputError::Failed {
+            path: folder.join(&name),
+            source,
+        })?;
+        let mut manifest = Manifest::read(folder);
+        manifest.set(&name, &digest);
+        Ok(manifest.write(folder)?)
+    }
+
+    /// All files, complete and without their names; the scene is the last.
+    fn stage(&self, folder: &Path, files: &DemoFiles) -> Result<Vec<Made>, OutputError> {
+        let mut stage = Stage {
+            folder,
+            made: Vec::new(),
+        };
+        stage.mesh(self.name, &files.mesh)?;
+        stage.map(self.name, files.map_size, &files.heights)?;
         if !files.colors.is_empty() {
             let size = files.color_size;
-            write_png_rgb8(&file("_color.png"), size, size, &files.colors, &[])?;
+            stage.add(format!("{}_color.png", self.name), |path| {
+                stage_png_rgb8(path, size, size, &files.colors, &[])
+            })?;
         }
         for part in &files.parts {
-            write_obj(&folder.join(format!("{}.obj", part.name)), &part.mesh)?;
-            let map = folder.join(format!("{}_height.png", part.name));
-            write_png_gray16(&map, part.map_size, part.map_size, &part.heights)?;
+            stage.mesh(part.name, &part.mesh)?;
+            stage.map(part.name, part.map_size, &part.heights)?;
         }
         if files.scene.contains("floor.obj") {
-            write_obj(&folder.join("floor.obj"), &floor())?;
+            stage.mesh("floor", &floor())?;
         }
-        output::write(&scene, |out| out.write_all(files.scene.as_bytes()))?;
-        Ok(scene)
+        stage.add(format!("{}.toml", self.name), |path| {
+            output::stage(path, |out| out.write_all(files.scene.as_bytes()))
+        })?;
+        Ok(stage.made)
+    }
+}
+
+/// A file of the demo on its way.
+struct Made {
+    name: String,
+    digest: String,
+    staged: Staged,
+}
+
+/// Where they gather.
+struct Stage<'a> {
+    folder: &'a Path,
+    made: Vec<Made>,
+}
+
+impl Stage<'_> {
+    fn add(
+        &mut self,
+        name: String,
+        stage: impl FnOnce(&Path) -> Result<Staged, OutputError>,
+    ) -> Result<(), OutputError> {
+        let path = self.folder.join(&name);
+        let staged = stage(&path)?;
+        let digest =
+            digest(staged.content()).map_err(|source| OutputError::Failed { path, source })?;
+        self.made.push(Made {
+            name,
+            digest,
+            staged,
+        });
+        Ok(())
+    }
+
+    fn mesh(&mut self, name: &str, mesh: &MeshBuilder) -> Result<(), OutputError> {
+        self.add(format!("{name}.obj"), |path| stage_obj(path, mesh))
+    }
+
+    fn map(&mut self, name: &str, size: usize, heights: &[u16]) -> Result<(), OutputError> {
+        self.add(format!("{name}_height.png"), |path| {
+            stage_png_gray16(path, size, size, heights)
+        })
     }
 }
 
@@ -82,8 +203,8 @@ fn floor() -> MeshBuilder {
 }
 
 /// Writes a mesh as Wavefront OBJ: one `v`, `vt` and `vn` per vertex with one index for all three.
-fn write_obj(path: &Path, mesh: &MeshBuilder) -> Result<(), OutputError> {
-    output::write(path, |out| {
+fn stage_obj(path: &Path, mesh: &MeshBuilder) -> Result<Staged, OutputError> {
+    output::stage(path, |out| {
         for p in &mesh.positions {
             writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
         }

@@ -1,11 +1,16 @@
 //! Files that appear complete or not at all.
 
-use std::ffi::OsString;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, ErrorKind, Write};
+mod target;
+mod temporary;
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
+
+use super::identity::Identity;
+use target::Target;
 
 /// Why a file could not be written. The old file, if there was one, is untouched.
 #[derive(Debug, Error)]
@@ -24,6 +29,14 @@ pub enum OutputError {
         /// The path as given.
         path: PathBuf,
     },
+    /// The file that is there is read-only, or another user's.
+    #[error("cannot write {path}: the file that is there may not be changed ({source})")]
+    Protected {
+        /// The file.
+        path: PathBuf,
+        /// What the system said, or would say.
+        source: io::Error,
+    },
     /// No permission, or a read-only file system.
     #[error("cannot write {path}: {folder} is not writable ({source})")]
     NotWritable {
@@ -33,6 +46,22 @@ pub enum OutputError {
         folder: PathBuf,
         /// What the system said.
         source: io::Error,
+    },
+    /// The file is one that the same run reads.
+    #[error("cannot write {path} over {input}: this run reads that file")]
+    IsInput {
+        /// The output as given.
+        path: PathBuf,
+        /// The input's name.
+        input: PathBuf,
+    },
+    /// The file is another output of the same run.
+    #[error("cannot write both {path} and {other}: they are one file")]
+    Twice {
+        /// One output.
+        path: PathBuf,
+        /// The other.
+        other: PathBuf,
     },
     /// No space left on the disk, or in the user's quota.
     #[error("cannot write {path}: the disk is full ({source})")]
@@ -66,190 +95,101 @@ pub enum OutputError {
     },
 }
 
+impl OutputError {
+    /// Whether the outputs were chosen badly, and nothing is wrong with any of them.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::IsInput { .. } | Self::Twice { .. })
+    }
+}
+
 /// Writes a file through `body`, then gives it its name.
 ///
-/// `body` writes to a temporary file in the folder of `path`, which is flushed and renamed over `path` once `body`
-/// has succeeded. On any error the temporary file is gone and what was at `path` is as before. A symbolic link at
-/// `path` is followed. Nothing is synced: after a power cut the file may be lost.
+/// `body` writes to a temporary file in the folder of `path`, which takes the place of `path` once `body` has succeeded. On any
+/// error the temporary file is gone and what was at `path` is as before. If the process is killed on the way the temporary file
+/// stays, until the next `write` or [`check`] of the same file removes it.
+///
+/// File and folder are synced: after a power cut there is the old file or the new one, whole. A symbolic link at `path` is
+/// followed, also to where nothing is yet. The new file has the old one's mode, and its owner as far as that is allowed.
+///
+/// # Errors
+///
+/// As [`check`], and what the system or `body` says. If the last step alone fails, the sync of the folder, the new file is there.
 pub fn write(
     path: &Path,
     body: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
 ) -> Result<(), OutputError> {
-    let (target, folder) = resolve(path)?;
-    let failed = |source| classify(path, &folder, source);
-    let temporary = temporary_file(&target, &folder).map_err(failed)?;
-    let mut writer = BufWriter::new(temporary.as_file());
-    body(&mut writer).map_err(failed)?;
-    writer.flush().map_err(failed)?;
+    stage(path, body)?.commit()
+}
+
+/// The first half of [`write()`]: the file is complete and on the disk, but still without its name.
+///
+/// # Errors
+///
+/// As [`write()`].
+pub fn stage(
+    path: &Path,
+    body: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
+) -> Result<Staged, OutputError> {
+    let target = Target::of(path)?;
+    let temporary = target.temporary()?;
+    let file = temporary.as_file();
+    let mut writer = BufWriter::new(file);
+    body(&mut writer)
+        .and_then(|()| writer.flush())
+        .and_then(|()| target.dress(file))
+        // Before the name: it must not lead to a file whose bytes are lost in a power cut.
+        .and_then(|()| file.sync_all())
+        .map_err(|source| target.failed(source))?;
     drop(writer);
-    match temporary.persist(&target) {
-        Ok(_) => Ok(()),
-        Err(error) => Err(failed(error.error)), // the temporary file inside the error is removed with it
+    Ok(Staged { temporary, target })
+}
+
+/// A complete file that has not got its name yet, and is gone if it never gets it.
+#[derive(Debug)]
+pub struct Staged {
+    temporary: tempfile::NamedTempFile,
+    target: Target,
+}
+
+impl Staged {
+    /// Where its bytes are for now.
+    pub fn content(&self) -> &Path {
+        self.temporary.path()
+    }
+
+    /// Gives the file its name: the second half of [`write()`].
+    ///
+    /// # Errors
+    ///
+    /// As [`write()`].
+    pub fn commit(self) -> Result<(), OutputError> {
+        let Self { temporary, target } = self;
+        let named = temporary.persist(&target.file);
+        named // the temporary file inside the error is removed with it
+            .map_err(|error| error.error)
+            .and_then(|_| target.sync_folder())
+            .map_err(|source| target.failed(source))
     }
 }
 
 /// Fails now if [`write()`] to this path would fail for its name, its folder or permissions.
+///
+/// Refused are: folders, and names that end as theirs do; devices and pipes, which a rename would replace; what is in no folder;
+/// names that the file system does not take; and files that are read-only, which a rename would replace as well.
+///
+/// # Errors
+///
+/// Any but [`OutputError::IsInput`] and [`OutputError::Twice`].
 pub fn check(path: &Path) -> Result<(), OutputError> {
-    let (target, folder) = resolve(path)?;
-    match temporary_file(&target, &folder) {
-        Ok(_) => Ok(()), // dropped, and removed with that
-        Err(source) => Err(classify(path, &folder, source)),
-    }
+    checked(path).map(drop)
 }
 
-/// The file that is meant, links followed, and its folder.
-fn resolve(path: &Path) -> Result<(PathBuf, PathBuf), OutputError> {
-    let not_a_file = || OutputError::NotAFile {
-        path: path.to_owned(),
-    };
-    let target = match fs::canonicalize(path) {
-        Ok(existing) => existing,
-        Err(_) => path.to_owned(),
-    };
-    // Renaming over a device or a pipe would replace it.
-    if fs::metadata(&target).is_ok_and(|found| !found.is_file()) || target.file_name().is_none() {
-        return Err(not_a_file());
-    }
-    let folder = match target.parent() {
-        Some(parent) if parent != Path::new("") => parent.to_owned(),
-        _ => PathBuf::from("."),
-    };
-    match fs::metadata(&folder) {
-        Ok(found) if found.is_dir() => Ok((target, folder)),
-        Err(error) if error.kind() == ErrorKind::PermissionDenied => {
-            Err(classify(path, &folder, error))
-        }
-        _ => Err(OutputError::FolderMissing {
-            path: path.to_owned(),
-            folder,
-        }),
-    }
-}
-
-fn temporary_file(target: &Path, folder: &Path) -> io::Result<tempfile::NamedTempFile> {
-    let mut prefix = OsString::from(".");
-    prefix.push(target.file_name().unwrap_or_default());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(".part");
-    // Temporary files are private by default; an output is to be as readable as the umask says.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
-}
-
-fn classify(path: &Path, folder: &Path, source: io::Error) -> OutputError {
-    let (path, folder) = (path.to_owned(), folder.to_owned());
-    match source.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => OutputError::DiskFull { path, source },
-        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => OutputError::NotWritable {
-            path,
-            folder,
-            source,
-        },
-        _ => OutputError::Failed { path, source },
-    }
+/// As [`check`]; which file it would be.
+pub(super) fn checked(path: &Path) -> Result<Identity, OutputError> {
+    let target = Target::of(path)?;
+    target.temporary()?; // dropped, and removed with that
+    Ok(target.identity())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn names(folder: &Path) -> Vec<String> {
-        fs::read_dir(folder)
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect()
-    }
-
-    #[test]
-    fn a_complete_file_replaces_the_old_one() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("out.txt");
-        write(&path, |file| file.write_all(b"old")).unwrap();
-        write(&path, |file| file.write_all(b"new")).unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"new");
-        assert_eq!(names(folder.path()), ["out.txt"]);
-    }
-
-    #[test]
-    fn a_failure_half_way_leaves_the_old_file_and_nothing_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("out.txt");
-        let half = |file: &mut BufWriter<&File>| {
-            file.write_all(&[0; 100_000])?;
-            Err(io::Error::from(ErrorKind::StorageFull))
-        };
-        assert!(matches!(
-            write(&path, half),
-            Err(OutputError::DiskFull { .. })
-        ));
-        assert!(names(folder.path()).is_empty());
-        fs::write(&path, b"old").unwrap();
-        assert!(write(&path, half).is_err());
-        assert_eq!(fs::read(&path).unwrap(), b"old");
-        assert_eq!(names(folder.path()), ["out.txt"]);
-    }
-
-    /// /dev/full accepts a file's opening and refuses its bytes, but no file can be made in its folder as a test;
-    /// what can be tested everywhere is that an error of the last flush is not lost.
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn an_error_that_shows_only_when_flushed_is_reported() {
-        let full = fs::OpenOptions::new()
-            .write(true)
-            .open("/dev/full")
-            .unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("out.txt");
-        let result = write(&path, |_| {
-            let mut writer = BufWriter::new(&full);
-            writer.write_all(b"fits the buffer")?;
-            writer.flush()
-        });
-        assert!(
-            matches!(result, Err(OutputError::DiskFull { .. })),
-            "{result:?}"
-        );
-    }
-
-    #[test]
-    fn a_missing_folder_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("no/such/out.png");
-        match write(&path, |_| Ok(())) {
-            Err(OutputError::FolderMissing { folder: named, .. }) => {
-                assert_eq!(named, folder.path().join("no/such"));
-            }
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn folders_and_devices_are_not_replaced() {
-        let folder = tempfile::tempdir().unwrap();
-        for path in [
-            folder.path(),
-            Path::new("/dev/null"),
-            Path::new("/"),
-            Path::new(""),
-        ] {
-            let result = write(path, |_| Ok(()));
-            assert!(
-                matches!(result, Err(OutputError::NotAFile { .. })),
-                "{path:?}: {result:?}"
-            );
-        }
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_link_stays_a_link() {
-        let folder = tempfile::tempdir().unwrap();
-        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
-        fs::write(&file, b"old").unwrap();
-        std::os::unix::fs::symlink(&file, &link).unwrap();
-        write(&link, |out| out.write_all(b"new")).unwrap();
-        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
-        assert_eq!(fs::read(&file).unwrap(), b"new");
-    }
-}
+mod tests;

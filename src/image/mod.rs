@@ -40,6 +40,7 @@ pub use format::Format;
 pub use heights::load_heights;
 pub use source::Source;
 pub use srgb::{srgb_decode, srgb_encode};
+pub(crate) use write::{stage_png_gray16, stage_png_rgb8};
 pub use write::{write_exr, write_exr_picture, write_png_gray16, write_png_rgb8};
 
 /// Most pixels of a picture that is read: 32768 x 16384.

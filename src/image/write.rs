@@ -11,7 +11,7 @@ use exr::prelude::{
 };
 
 use super::exr_picture::{ExrChannel, ExrPicture, ExrSamples};
-use crate::files::output::{self, OutputError};
+use crate::files::output::{self, OutputError, Staged};
 
 /// Writes an 8-bit RGB PNG, `pixels` sRGB-encoded, bottom row first, with `texts` (keyword, text) in it.
 pub fn write_png_rgb8(
@@ -21,8 +21,19 @@ pub fn write_png_rgb8(
     pixels: &[[u8; 3]],
     texts: &[(String, String)],
 ) -> Result<(), OutputError> {
+    stage_png_rgb8(path, width, height, pixels, texts)?.commit()
+}
+
+/// As [`write_png_rgb8`], short of the file's name.
+pub(crate) fn stage_png_rgb8(
+    path: &Path,
+    width: usize,
+    height: usize,
+    pixels: &[[u8; 3]],
+    texts: &[(String, String)],
+) -> Result<Staged, OutputError> {
     let pixels = top_first(path, width, height, pixels)?;
-    write_png(path, width, height, pixels.as_flattened(), |info| {
+    stage_png(path, width, height, pixels.as_flattened(), |info| {
         info.set_color(png::ColorType::Rgb);
         info.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
         for (keyword, text) in texts {
@@ -39,16 +50,26 @@ pub fn write_png_gray16(
     height: usize,
     heights: &[u16],
 ) -> Result<(), OutputError> {
+    stage_png_gray16(path, width, height, heights)?.commit()
+}
+
+/// As [`write_png_gray16`], short of the file's name.
+pub(crate) fn stage_png_gray16(
+    path: &Path,
+    width: usize,
+    height: usize,
+    heights: &[u16],
+) -> Result<Staged, OutputError> {
     let heights = top_first(path, width, height, heights)?;
     let bytes: Vec<u8> = heights.iter().flat_map(|h| h.to_be_bytes()).collect();
-    write_png(path, width, height, &bytes, |info| {
+    stage_png(path, width, height, &bytes, |info| {
         info.set_color(png::ColorType::Grayscale);
         info.set_depth(png::BitDepth::Sixteen);
         Ok(())
     })
 }
 
-fn write_png(
+fn stage_png(
     path: &Path,
     width: usize,
     height: usize,
@@ -56,10 +77,10 @@ fn write_png(
     describe: impl FnOnce(
         &mut png::Encoder<&mut io::BufWriter<&std::fs::File>>,
     ) -> Result<(), png::EncodingError>,
-) -> Result<(), OutputError> {
+) -> Result<Staged, OutputError> {
     // A side beyond 32 bits holds more pixels than memory does; the encoder refuses what is beyond PNG's 31.
     let (width, height) = (width as u32, height as u32);
-    output::write(path, |file| {
+    output::stage(path, |file| {
         let mut encoder = png::Encoder::new(file, width, height);
         encoder.set_compression(png::Compression::Fast);
         let written = describe(&mut encoder).and_then(|()| {

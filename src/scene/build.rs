@@ -43,6 +43,8 @@ pub struct Loaded {
     pub maps: Vec<MapFile>,
     /// What was mended on the way, one line each.
     pub warnings: Vec<String>,
+    /// Every file that was read: scene, meshes and what they name, pictures.
+    pub files: Vec<PathBuf>,
     /// Where the file places the camera, if it does.
     eye: Option<Keyed<Vec3>>,
 }
@@ -92,6 +94,7 @@ impl Loaded {
             lights => builder.lights(lights)?,
         };
         let camera = frame::camera(&file.camera, frame::bounds(&builder.objects))?;
+        builder.files.push(path.to_owned());
         let loaded = builder.finish(path, camera, file.film, lights, file.integrator);
         Ok(Self {
             eye: file.camera.position,
@@ -116,6 +119,7 @@ impl Loaded {
             .assets
             .heights(map, &source.channel, source.wrap, source.nodata)?;
         let mut file = load_mesh(mesh)?;
+        builder.files.append(&mut file.files);
         builder.warn_all(mesh, std::mem::take(&mut file.warnings));
         if let Some(projection) = source.texcoords {
             file.project(projection);
@@ -172,6 +176,8 @@ struct Builder {
     materials: Vec<Material>,
     default_material: Option<usize>,
     warnings: Vec<String>,
+    /// All that was read but pictures, which `assets` knows.
+    files: Vec<PathBuf>,
 }
 
 impl Builder {
@@ -190,6 +196,7 @@ impl Builder {
         if let Some(projection) = table.texcoords {
             loaded.project(projection);
         }
+        self.files.append(&mut loaded.files);
         self.warn_all(path, loaded.warnings);
         let single = loaded.parts.len() == 1;
         let mut of_file = HashMap::new();
@@ -408,14 +415,16 @@ impl Builder {
     }
 
     fn finish(
-        self,
+        mut self,
         path: &Path,
         camera: Camera,
         film: Film,
         lights: Vec<Light>,
         integrator: Integrator,
     ) -> Loaded {
+        self.files.extend(self.assets.files().map(Path::to_owned));
         Loaded {
+            files: self.files,
             maps: self.assets.into_maps(),
             warnings: self.warnings,
             eye: None,

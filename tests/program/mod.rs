@@ -44,7 +44,18 @@ impl Folder {
 
     /// A folder with `quad.obj`, `flat.png` (8x8 texels of height 32768) and `scene.toml`.
     pub fn with_quad() -> Self {
-        let folder = Self::empty();
+        Self::empty().filled()
+    }
+
+    /// The same in a file system without a disk, if there is one: many small files do not wait for it there.
+    pub fn in_memory() -> Self {
+        tempfile::tempdir_in("/dev/shm")
+            .map_or_else(|_| Self::empty(), Self)
+            .filled()
+    }
+
+    fn filled(self) -> Self {
+        let folder = self;
         folder.put("quad.obj", QUAD);
         folder.put("scene.toml", SCENE);
         write_png_gray16(&folder.path("flat.png"), 8, 8, &[32768; 64]).unwrap();

@@ -149,6 +149,16 @@ impl Assets {
         self.stand_in.get_or_insert_with(checker).clone()
     }
 
+    /// The picture files that have been read, some perhaps more than once.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let heights = self.heights.iter().map(|((path, ..), _)| path);
+        let scalars = self.scalars.iter().map(|(((path, _), ..), _)| path);
+        let colors = self.colors.iter().map(|(((path, _), ..), _)| path);
+        let environments = self.environments.iter().map(|(path, _)| path);
+        let all = heights.chain(scalars).chain(colors).chain(environments);
+        all.map(PathBuf::as_path)
+    }
+
     /// The displacement maps, in the order of their first use.
     pub fn into_maps(self) -> Vec<MapFile> {
         let maps = self.heights.into_iter();
