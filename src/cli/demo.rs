@@ -10,6 +10,7 @@ use super::march::MarchArgs;
 use super::picture::Target;
 use super::render::Job;
 use crate::demo::{DEMOS, Demo};
+use crate::scene::load::LoadOptions;
 
 /// Make a ready scene and a picture of it
 ///
@@ -69,6 +70,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         scene: &scene,
         film: &args.film,
         set: &[],
+        load: LoadOptions::default(),
         integrator: None,
         samples: None,
         resume: false,

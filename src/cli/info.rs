@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::engine::EngineArgs;
 use super::error::CliError;
+use super::load::LoadArgs;
 use super::memory::Memory;
 use crate::prism::{March, PrismOptions, Step};
 use crate::scene::{Loaded, MapFile, ObjectShape};
@@ -28,6 +29,8 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    load: LoadArgs,
+    #[command(flatten)]
     engine: EngineArgs,
 }
 
@@ -35,7 +38,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.check_backend()?;
     args.engine.start_threads()?;
-    let loaded = Loaded::from_file(&args.scene)?;
+    let loaded = Loaded::from_file_with(&args.scene, &[], args.load.options())?;
     super::warn(&loaded.warnings);
     let world = loaded.scene.world()?;
     let engine = args.engine.build(&world)?;

@@ -26,7 +26,10 @@ pub fn load_heights(
 }
 
 /// Width, height and heights, bottom row first.
-fn read_texels(path: &Path, channel: &Channel) -> Result<(usize, usize, Texels), ImageError> {
+pub(super) fn read_texels(
+    path: &Path,
+    channel: &Channel,
+) -> Result<(usize, usize, Texels), ImageError> {
     let (format, file) = format::open(path)?;
     if format == Format::Exr {
         let file = ExrFile::open(path, file)?;

@@ -15,6 +15,7 @@ mod exr_picture;
 mod format;
 mod heights;
 mod raster;
+mod scalar;
 mod srgb;
 mod tiff_file;
 mod write;
@@ -27,6 +28,7 @@ pub use exr_file::{read_exr, read_exr_header};
 pub use exr_picture::{ExrChannel, ExrPicture, ExrSamples};
 pub use format::Format;
 pub use heights::load_heights;
+pub use scalar::{ScalarImage, load_scalar};
 pub use srgb::{srgb_decode, srgb_encode};
 pub use write::{write_exr, write_exr_picture, write_png_gray16, write_png_rgb8};
 

@@ -8,20 +8,22 @@ use glam::Vec3;
 
 use super::MapFile;
 use crate::image::{
-    self, Channel, ColorImage, ColorPixels, ColorSpace, EnvironmentImage, ImageError,
+    self, Channel, ColorImage, ColorPixels, ColorSpace, EnvironmentImage, ImageError, ScalarImage,
 };
 use crate::scene::error::AssetError;
 use crate::surface::{DisplacementMap, Wrap};
 
 /// A channel of a picture, and how it goes on outside.
-type ChannelKey = (PathBuf, Channel, Wrap);
+type ChannelKey<W> = (PathBuf, Channel, W);
 
 /// What has been loaded so far.
 #[derive(Default)]
 pub(super) struct Assets {
-    heights: Vec<(ChannelKey, Arc<DisplacementMap>)>,
-    scalars: Vec<(ChannelKey, Arc<DisplacementMap>)>,
+    heights: Vec<(ChannelKey<Wrap>, Arc<DisplacementMap>)>,
+    scalars: Vec<(ChannelKey<[Wrap; 2]>, Arc<ScalarImage>)>,
     colors: Vec<((PathBuf, ColorSpace, Vec3), Arc<ColorImage>)>,
+    embedded_colors: Vec<((Arc<[u8]>, ColorSpace, Vec3), Arc<ColorImage>)>,
+    embedded_scalars: Vec<((Arc<[u8]>, Channel, [Wrap; 2]), Arc<ScalarImage>)>,
     environments: Vec<(PathBuf, Arc<EnvironmentImage>)>,
 }
 
@@ -33,7 +35,10 @@ impl Assets {
         channel: &Channel,
         wrap: Wrap,
     ) -> Result<Arc<DisplacementMap>, AssetError> {
-        channel_once(&mut self.heights, path, channel, wrap)
+        let key = (identity(path), channel.clone(), wrap);
+        once(&mut self.heights, key, || {
+            image::load_heights(path, channel, wrap)
+        })
     }
 
     /// A channel of a picture as a parameter of a material; apart from the heights, which are reported and edited.
@@ -41,9 +46,12 @@ impl Assets {
         &mut self,
         path: &Path,
         channel: &Channel,
-        wrap: Wrap,
-    ) -> Result<Arc<DisplacementMap>, AssetError> {
-        channel_once(&mut self.scalars, path, channel, wrap)
+        wrap: [Wrap; 2],
+    ) -> Result<Arc<ScalarImage>, AssetError> {
+        let key = (identity(path), channel.clone(), wrap);
+        once(&mut self.scalars, key, || {
+            image::load_scalar(path, channel, wrap)
+        })
     }
 
     /// A colour picture, times `tint`.
@@ -55,7 +63,36 @@ impl Assets {
     ) -> Result<Arc<ColorImage>, AssetError> {
         let key = (identity(path), space, tint);
         once(&mut self.colors, key, || {
-            Ok(tinted(image::load_color(path, space)?, tint))
+            Ok::<_, ImageError>(tinted(image::load_color(path, space)?, tint))
+        })
+    }
+
+    /// The picture that the mesh file at `path` holds, times `tint`.
+    pub fn embedded_color(
+        &mut self,
+        path: &Path,
+        bytes: &Arc<[u8]>,
+        space: ColorSpace,
+        tint: Vec3,
+    ) -> Result<Arc<ColorImage>, AssetError> {
+        let key = (bytes.clone(), space, tint);
+        once(&mut self.embedded_colors, key, || {
+            let image = unpacked(path, bytes, |file| image::load_color(file, space))?;
+            Ok::<_, AssetError>(tinted(image, tint))
+        })
+    }
+
+    /// A channel of the picture that the mesh file at `path` holds.
+    pub fn embedded_scalar(
+        &mut self,
+        path: &Path,
+        bytes: &Arc<[u8]>,
+        channel: &Channel,
+        wrap: [Wrap; 2],
+    ) -> Result<Arc<ScalarImage>, AssetError> {
+        let key = (bytes.clone(), channel.clone(), wrap);
+        once(&mut self.embedded_scalars, key, || {
+            unpacked(path, bytes, |file| image::load_scalar(file, channel, wrap))
         })
     }
 
@@ -74,27 +111,16 @@ impl Assets {
     }
 }
 
-/// A channel of a picture, known or loaded.
-fn channel_once(
-    known: &mut Vec<(ChannelKey, Arc<DisplacementMap>)>,
-    path: &Path,
-    channel: &Channel,
-    wrap: Wrap,
-) -> Result<Arc<DisplacementMap>, AssetError> {
-    let key = (identity(path), channel.clone(), wrap);
-    once(known, key, || image::load_heights(path, channel, wrap))
-}
-
 /// What `known` has for `key`, else what `load` gives. A scene names few files: no hashing is needed.
-fn once<K: PartialEq, T>(
+fn once<K: PartialEq, T, E: Into<AssetError>>(
     known: &mut Vec<(K, Arc<T>)>,
     key: K,
-    load: impl FnOnce() -> Result<T, ImageError>,
+    load: impl FnOnce() -> Result<T, E>,
 ) -> Result<Arc<T>, AssetError> {
     if let Some((_, asset)) = known.iter().find(|(k, _)| *k == key) {
         return Ok(asset.clone());
     }
-    let asset = Arc::new(load()?);
+    let asset = Arc::new(load().map_err(Into::into)?);
     known.push((key, asset.clone()));
     Ok(asset)
 }
@@ -102,27 +128,6 @@ fn once<K: PartialEq, T>(
 /// The same for every way to write a path; the path as it is where the file does not exist.
 fn identity(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
-}
-
-/// The picture that the mesh file at `path` holds, times `tint`.
-pub(super) fn embedded_color(
-    path: &Path,
-    bytes: &[u8],
-    space: ColorSpace,
-    tint: Vec3,
-) -> Result<Arc<ColorImage>, AssetError> {
-    let image = unpacked(path, bytes, |file| image::load_color(file, space))?;
-    Ok(Arc::new(tinted(image, tint)))
-}
-
-/// A channel of the picture that the mesh file at `path` holds.
-pub(super) fn embedded_scalar(
-    path: &Path,
-    bytes: &[u8],
-    channel: &Channel,
-    wrap: Wrap,
-) -> Result<Arc<DisplacementMap>, AssetError> {
-    unpacked(path, bytes, |file| image::load_heights(file, channel, wrap)).map(Arc::new)
 }
 
 /// What `load` makes of a picture that the mesh file at `path` holds: its readers want a file.

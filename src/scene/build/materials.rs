@@ -5,7 +5,6 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::Builder;
-use super::assets;
 use crate::image::{Channel, ColorSpace};
 use crate::scene::error::{AssetError, SceneError};
 use crate::scene::file::{
@@ -82,7 +81,7 @@ impl Builder {
             .assets
             .scalar(&table.file.value, &table.channel, table.wrap);
         Ok(ScalarTexture {
-            map: loaded.map_err(|e| table.file.asset(e))?,
+            image: loaded.map_err(|e| table.file.asset(e))?,
             uv: table.uv,
             factor: table.factor,
         })
@@ -152,7 +151,9 @@ impl Builder {
         Ok(Texture {
             image: match &texture.source {
                 FileTexture::Path(picture) => self.assets.color(picture, space, factor)?,
-                FileTexture::Embedded(bytes) => assets::embedded_color(path, bytes, space, factor)?,
+                FileTexture::Embedded(bytes) => {
+                    self.assets.embedded_color(path, bytes, space, factor)?
+                }
             },
             wrap: texture.wrap,
             uv: texture.uv,
@@ -166,12 +167,13 @@ impl Builder {
         };
         let Ok(channel): Result<Channel, _> = channel.parse();
         Ok(Scalar::Texture(ScalarTexture {
-            map: match &texture.source {
+            image: match &texture.source {
                 FileTexture::Path(picture) => {
                     self.assets.scalar(picture, &channel, texture.wrap)?
                 }
                 FileTexture::Embedded(bytes) => {
-                    assets::embedded_scalar(path, bytes, &channel, texture.wrap)?
+                    let assets = &mut self.assets;
+                    assets.embedded_scalar(path, bytes, &channel, texture.wrap)?
                 }
             },
             uv: texture.uv,

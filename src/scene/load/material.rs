@@ -1,6 +1,7 @@
 //! What a mesh file says of a material, whatever its format.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -117,8 +118,8 @@ impl FileScalar {
 pub struct FileTextureUse {
     /// The picture.
     pub source: FileTexture,
-    /// Outside [0, 1].
-    pub wrap: Wrap,
+    /// Outside [0, 1], along u and v.
+    pub wrap: [Wrap; 2],
     /// Of texture coordinates with v up.
     pub uv: UvTransform,
 }
@@ -129,7 +130,7 @@ pub enum FileTexture {
     /// A picture file; not checked to exist.
     Path(PathBuf),
     /// The bytes of a PNG or JPEG file that the mesh file holds.
-    Embedded(Vec<u8>),
+    Embedded(Arc<[u8]>),
 }
 
 /// Detail finer than the mesh.

@@ -15,6 +15,7 @@ mod ply;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use glam::{Affine3A, DAffine3};
 use thiserror::Error;
 
 use crate::files::input;
@@ -95,6 +96,16 @@ pub enum LoadMeshErrorKind {
         /// What is wrong.
         problem: String,
     },
+    /// A glTF file that names a file outside of its folder, without leave.
+    #[error(
+        "{what}: its URI {uri:?} leads out of the file's folder; with --allow-external such files are read"
+    )]
+    External {
+        /// What the file is for.
+        what: String,
+        /// As it is written.
+        uri: String,
+    },
     /// Sound, but beyond this reader.
     #[error("{what} is not supported")]
     Unsupported {
@@ -104,6 +115,13 @@ pub enum LoadMeshErrorKind {
     /// Nothing to trace.
     #[error("the file holds no faces")]
     NoFaces,
+}
+
+/// What a mesh file may do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Whether a glTF file may name buffers and pictures outside of its own folder.
+    pub allow_external: bool,
 }
 
 /// A mesh file as read: not yet validated, nothing computed.
@@ -126,6 +144,8 @@ pub struct Part {
     pub mesh: MeshBuilder,
     /// The file's material, if it gives one.
     pub material: Option<FileMaterial>,
+    /// Empty: stands once as it is. Else where the file places it (EXT_mesh_gpu_instancing), as transforms of the mesh as it is.
+    pub instances: Vec<Affine3A>,
 }
 
 /// Reads a mesh file; the format goes by the ending.
@@ -134,8 +154,8 @@ pub struct Part {
 ///
 /// [`LoadMeshError`], which names the file. Numbers that are NaN or infinite are left to
 /// [`MeshBuilder::build`], which names the vertex.
-pub fn load_mesh(path: &Path) -> Result<LoadedFile, LoadMeshError> {
-    read(path).map_err(|kind| LoadMeshError {
+pub fn load_mesh(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshError> {
+    read(path, options).map_err(|kind| LoadMeshError {
         path: path.to_owned(),
         kind,
     })
@@ -156,17 +176,21 @@ impl LoadedFile {
         }
     }
 
-    /// All parts as one mesh, part after part; the materials are dropped.
-    pub fn into_single_mesh(self) -> MeshBuilder {
+    /// All parts that stand once as one mesh, part after part, without materials; and those that the file places itself.
+    pub fn into_single_mesh(self) -> (MeshBuilder, Vec<Part>) {
+        let (placed, single): (Vec<_>, Vec<_>) = self
+            .parts
+            .into_iter()
+            .partition(|part| !part.instances.is_empty());
         let mut whole = MeshBuilder::default();
-        for part in self.parts {
+        for part in single {
             whole.append(part.mesh);
         }
-        whole
+        (whole, placed)
     }
 }
 
-fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+fn read(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshErrorKind> {
     let extension = path
         .extension()
         .map(|e| e.to_string_lossy().to_lowercase())
@@ -184,7 +208,7 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     let mut file = match extension.as_str() {
         "obj" => obj::read(&bytes, path)?,
         "ply" => ply::read(&bytes)?,
-        _ => gltf::read(&bytes, path)?,
+        _ => gltf::read(&bytes, path, options)?,
     };
     if file.parts.is_empty() {
         return Err(LoadMeshErrorKind::NoFaces);
@@ -197,22 +221,55 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     Ok(file)
 }
 
-/// Sorts meshes into parts by material and by whether they have texture coordinates.
+/// Transforms of a mesh in its own space as transforms of the mesh as `moved` has it, so that one that stands still is moved as the
+/// mesh is and no more; `None` if `moved` leaves nothing to stand.
+pub(super) fn conjugated(
+    transforms: impl IntoIterator<Item = Affine3A>,
+    moved: &Affine3A,
+) -> Option<Vec<Affine3A>> {
+    let moved = in_double(moved);
+    let back = moved.inverse();
+    back.is_finite().then(|| {
+        let transforms = transforms.into_iter().map(|t| moved * in_double(&t) * back);
+        transforms.map(|t| t.as_affine3a()).collect()
+    })
+}
+
+fn in_double(t: &Affine3A) -> DAffine3 {
+    let [x, y, z] = [t.matrix3.x_axis, t.matrix3.y_axis, t.matrix3.z_axis].map(|c| c.as_dvec3());
+    DAffine3::from_cols(x, y, z, t.translation.as_dvec3())
+}
+
+/// Sorts meshes into parts by material, by whether they have texture coordinates, and by who instances them.
 #[derive(Default)]
 struct Parts {
     parts: Vec<Part>,
     /// Per part, the material's index in the file.
     materials: Vec<Option<usize>>,
-    by_key: HashMap<(Option<usize>, bool), usize>,
+    by_key: HashMap<PartKey, usize>,
 }
+
+/// Material, whether there are no texture coordinates, and the node that instances.
+type PartKey = (Option<usize>, bool, Option<usize>);
 
 impl Parts {
     /// Adds faces; a mesh without faces is forgotten.
     fn add(&mut self, name: &str, material: Option<usize>, mesh: MeshBuilder) {
+        self.add_placed(name, material, mesh, None);
+    }
+
+    /// The same of faces that a node of this number places many times.
+    fn add_placed(
+        &mut self,
+        name: &str,
+        material: Option<usize>,
+        mesh: MeshBuilder,
+        placed: Option<(usize, &[Affine3A])>,
+    ) {
         if mesh.triangles.is_empty() {
             return;
         }
-        let key = (material, mesh.texcoords.is_empty());
+        let key = (material, mesh.texcoords.is_empty(), placed.map(|p| p.0));
         let index = *self.by_key.entry(key).or_insert(self.parts.len());
         if index == self.parts.len() {
             self.materials.push(material);
@@ -220,6 +277,7 @@ impl Parts {
                 name: name.to_owned(),
                 mesh,
                 material: None,
+                instances: placed.map_or_else(Vec::new, |p| p.1.to_vec()),
             });
         } else {
             self.parts[index].mesh.append(mesh);
@@ -259,7 +317,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let result = load_mesh(&path);
+        let result = load_mesh(&path, LoadOptions::default());
         if let Err(e) = &result {
             assert!(e.to_string().contains(name), "{e} does not name the file");
         }
@@ -278,12 +336,12 @@ mod tests {
 
     #[test]
     fn missing_and_empty_files_are_refused() {
-        let missing = load_mesh(Path::new("no/such/mesh.obj")).unwrap_err();
+        let missing = load_mesh(Path::new("no/such/mesh.obj"), LoadOptions::default()).unwrap_err();
         assert!(matches!(missing.kind, LoadMeshErrorKind::Read { .. }));
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("mesh.obj");
         std::fs::create_dir(&folder).unwrap();
-        let refused = load_mesh(&folder).unwrap_err();
+        let refused = load_mesh(&folder, LoadOptions::default()).unwrap_err();
         assert!(matches!(refused.kind, LoadMeshErrorKind::Read { .. }));
         for known in MESH_EXTENSIONS {
             let empty = load_bytes(&format!("mesh.{known}"), b"").unwrap_err();
@@ -303,7 +361,7 @@ mod tests {
         let mut file = load_bytes("two.obj", text).unwrap();
         assert_eq!(file.parts.len(), 2);
         file.project(Projection::Planar);
-        let whole = file.into_single_mesh();
+        let (whole, _) = file.into_single_mesh();
         assert_eq!(whole.texcoords.len(), whole.positions.len());
         for (p, st) in whole.positions.iter().zip(&whole.texcoords) {
             assert_eq!(*st, p.truncate() / 4.0);

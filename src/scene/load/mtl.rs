@@ -256,7 +256,7 @@ impl<'a> Map<'a> {
     fn texture(&self, library: &Path) -> FileTextureUse {
         FileTextureUse {
             source: FileTexture::Path(beside(library, self.file)),
-            wrap: self.wrap.unwrap_or_default(),
+            wrap: [self.wrap.unwrap_or_default(); 2],
             uv: self.uv,
         }
     }

@@ -55,6 +55,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<LoadedFile, LoadMeshErrorKind> {
             name: String::new(),
             mesh,
             material: None,
+            instances: Vec::new(),
         });
     }
     Ok(file)

@@ -1,0 +1,217 @@
+//! The bytes of a document: every buffer read once, every compressed view unpacked once, when it is first asked for.
+
+use std::cell::OnceCell;
+use std::collections::HashMap;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use super::container::Container;
+use super::document::{Document, Meshopt};
+use super::uri::{Resource, Uris};
+use super::{LoadMeshErrorKind, malformed, meshopt};
+use crate::files::input;
+
+/// All buffers and buffer views.
+pub(super) struct Buffers<'a> {
+    document: &'a Document,
+    buffers: Vec<Bytes<'a>>,
+    /// Per view, what its stream unpacks to. Views of the same stream share the place of the first of them.
+    unpacked: Vec<(usize, OnceCell<Vec<u8>>)>,
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
+}
+
+/// A buffer.
+enum Bytes<'a> {
+    Chunk(&'a [u8]),
+    Own(Rc<[u8]>),
+    /// Of a compressed file, for readers that cannot unpack it.
+    Fallback,
+}
+
+/// What a buffer is made of.
+enum Source {
+    Chunk,
+    Fallback,
+    Bytes(Rc<[u8]>),
+    File(PathBuf),
+}
+
+impl<'a> Buffers<'a> {
+    /// Reads every buffer; a file that several name is read once.
+    pub fn read(
+        document: &'a Document,
+        container: &Container<'a>,
+        uris: Uris,
+    ) -> Result<Self, LoadMeshErrorKind> {
+        let sources = document.buffers.iter().enumerate();
+        let sources = sources.map(|(index, buffer)| {
+            let what = name(index);
+            Ok(match &buffer.uri {
+                _ if buffer.is_fallback() => Source::Fallback,
+                None if index == 0 && container.binary.is_some() => Source::Chunk,
+                None => {
+                    return Err(malformed(
+                        &what,
+                        "it has no URI, and there is no binary chunk for it",
+                    ));
+                }
+                Some(uri) => match uris.resolve(uri, &what)? {
+                    Resource::Bytes(bytes) => Source::Bytes(bytes.into()),
+                    Resource::File(file) => Source::File(file),
+                },
+            })
+        });
+        let sources = sources.collect::<Result<Vec<_>, _>>()?;
+        let mut files = Files::default();
+        for (buffer, source) in document.buffers.iter().zip(&sources) {
+            if let Source::File(file) = source {
+                files.want(file, buffer.byte_length);
+            }
+        }
+        let mut buffers = Vec::with_capacity(sources.len());
+        for (index, source) in sources.into_iter().enumerate() {
+            let bytes = match source {
+                Source::Chunk => Bytes::Chunk(container.binary.unwrap_or_default()),
+                Source::Fallback => Bytes::Fallback,
+                Source::Bytes(bytes) => Bytes::Own(bytes),
+                Source::File(file) => Bytes::Own(files.read(&file, &name(index))?),
+            };
+            let wanted = document.buffers[index].byte_length;
+            if let Some(found) = bytes.get().map(<[u8]>::len)
+                && found < wanted
+            {
+                let problem = format!("{found} bytes found, {wanted} expected");
+                return Err(malformed(&name(index), problem));
+            }
+            buffers.push(bytes);
+        }
+        Ok(Self {
+            document,
+            buffers,
+            unpacked: shared_streams(document),
+            files: files.named,
+        })
+    }
+
+    /// The bytes of buffer view `index`, unpacked if they are compressed.
+    pub fn view(&self, index: usize) -> Result<&[u8], LoadMeshErrorKind> {
+        let view = &self.document.buffer_views[index];
+        let Some(stream) = view.meshopt() else {
+            return self.slice(view.buffer, view.byte_offset, view.byte_length, index);
+        };
+        let unpacked = &self.unpacked[self.unpacked[index].0].1;
+        if let Some(bytes) = unpacked.get() {
+            return Ok(bytes);
+        }
+        let packed = self.slice(stream.buffer, stream.byte_offset, stream.byte_length, index)?;
+        let bytes = meshopt::decode(stream, packed).map_err(|problem| {
+            malformed(&format!("buffer view {index}, meshopt stream"), problem)
+        })?;
+        Ok(unpacked.get_or_init(|| bytes))
+    }
+
+    /// From one element of a view to the next, if the view says.
+    pub fn stride(&self, index: usize) -> Option<usize> {
+        let view = &self.document.buffer_views[index];
+        view.meshopt().map(|s| s.byte_stride).or(view.byte_stride)
+    }
+
+    /// All bytes there are.
+    pub fn len(&self) -> usize {
+        let buffers = self.buffers.iter().filter_map(Bytes::get);
+        buffers.map(<[u8]>::len).sum()
+    }
+
+    fn slice(
+        &self,
+        buffer: usize,
+        offset: usize,
+        length: usize,
+        view: usize,
+    ) -> Result<&[u8], LoadMeshErrorKind> {
+        let what = format!("buffer view {view}");
+        let Some(bytes) = self.buffers[buffer].get() else {
+            return Err(malformed(
+                &what,
+                format!("it lies in buffer {buffer}, a fallback without bytes"),
+            ));
+        };
+        let range = offset..offset.saturating_add(length);
+        bytes.get(range).ok_or_else(|| {
+            let found = bytes.len();
+            let problem = format!("its {length} bytes from {offset} on do not lie inside buffer {buffer} of {found} bytes");
+            malformed(&what, problem)
+        })
+    }
+}
+
+impl Bytes<'_> {
+    fn get(&self) -> Option<&[u8]> {
+        match self {
+            Self::Chunk(bytes) => Some(bytes),
+            Self::Own(bytes) => Some(bytes),
+            Self::Fallback => None,
+        }
+    }
+}
+
+fn name(buffer: usize) -> String {
+    format!("buffer {buffer}")
+}
+
+/// Per view, the first view that unpacks the same stream.
+fn shared_streams(document: &Document) -> Vec<(usize, OnceCell<Vec<u8>>)> {
+    let mut first: HashMap<&Meshopt, usize> = HashMap::new();
+    let views = document.buffer_views.iter().enumerate();
+    views
+        .map(|(index, view)| {
+            let place = view
+                .meshopt()
+                .map_or(index, |stream| *first.entry(stream).or_insert(index));
+            (place, OnceCell::new())
+        })
+        .collect()
+}
+
+/// The files that buffers are read from.
+#[derive(Default)]
+struct Files {
+    /// By the one path that all names of a file lead to.
+    known: HashMap<PathBuf, (usize, Option<Rc<[u8]>>)>,
+    named: Vec<PathBuf>,
+}
+
+impl Files {
+    /// As many bytes of the file will be needed, or more.
+    fn want(&mut self, file: &Path, bytes: usize) {
+        let (wanted, _) = self.known.entry(identity(file)).or_default();
+        *wanted = bytes.max(*wanted);
+    }
+
+    /// The first bytes of the file, as many as are wanted or there are.
+    fn read(&mut self, file: &Path, what: &str) -> Result<Rc<[u8]>, LoadMeshErrorKind> {
+        let (wanted, known) = self.known.entry(identity(file)).or_default();
+        if let Some(bytes) = known {
+            return Ok(bytes.clone());
+        }
+        let bytes = read_start(file, *wanted).map_err(|source| LoadMeshErrorKind::Read {
+            what: format!("{what}, {}", file.display()),
+            source,
+        })?;
+        self.named.push(file.to_owned());
+        Ok(known.insert(bytes.into()).clone())
+    }
+}
+
+fn read_start(file: &Path, wanted: usize) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let wanted = u64::try_from(wanted).unwrap_or(u64::MAX);
+    input::open(file)?.take(wanted).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn identity(file: &Path) -> PathBuf {
+    file.canonicalize().unwrap_or_else(|_| file.to_owned())
+}
