@@ -13,7 +13,7 @@ use glam::{Affine3A, Vec3};
 
 use super::error::{AssetError, SceneError};
 use super::file::{DisplacementTable, Keyed, LightTable, MeshTable, SCALE, SceneFile, default_sun};
-use super::load::{FileDisplacement, FileMaterial, LoadOptions, Part, conjugated, load_mesh};
+use super::load::{FileDisplacement, FileMaterial, LoadOptions, Part, conjugated, load_mesh_with};
 use super::{Camera, Film, Integrator, Light, Material, ObjectShape, Scene, SceneObject};
 use crate::image::Channel;
 use crate::prism::{March, PrismOptions};
@@ -117,13 +117,14 @@ impl Loaded {
         let mut builder = Builder::default();
         let MeshAndMap { mesh, map, .. } = source;
         let map = builder.assets.heights(map, &source.channel, source.wrap)?;
-        let mut file = load_mesh(mesh, source.options)?;
+        let mut file = load_mesh_with(mesh, source.options)?;
         builder.warn_all(mesh, std::mem::take(&mut file.warnings));
         if let Some(projection) = source.texcoords {
             file.project(projection);
         }
         let name = stem(mesh);
-        let (whole, placed) = file.into_single_mesh();
+        let placed = file.take_placed();
+        let whole = file.into_single_mesh();
         let whole = (!whole.triangles.is_empty()).then_some((name.clone(), whole, Vec::new()));
         let placed = placed.into_iter().map(|part| {
             let Part {
@@ -196,7 +197,7 @@ impl Builder {
             recompute_normals: table.recompute_normals,
             crease_angle: table.crease_angle,
         };
-        let mut loaded = load_mesh(path, options).map_err(|e| asset(e.into()))?;
+        let mut loaded = load_mesh_with(path, options).map_err(|e| asset(e.into()))?;
         if let Some(projection) = table.texcoords {
             loaded.project(projection);
         }

@@ -142,7 +142,16 @@ impl Meshes<'_> {
                     ),
                 });
             }
-            let builder = builder.transformed(&world);
+            let mut builder = builder.transformed(&world);
+            let dequantization = primitive
+                .material
+                .and_then(|m| self.materials.dequantization(m));
+            if let Some(uv) = dequantization {
+                let uv = uv.to_affine();
+                for st in &mut builder.texcoords {
+                    *st = uv.transform_point2(*st);
+                }
+            }
             let placed = placed.as_ref().map(|placed| (index, &placed[..]));
             self.parts
                 .add_placed(name, primitive.material, builder, placed);

@@ -154,7 +154,16 @@ pub struct Part {
 ///
 /// [`LoadMeshError`], which names the file. Numbers that are NaN or infinite are left to
 /// [`MeshBuilder::build`], which names the vertex.
-pub fn load_mesh(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshError> {
+pub fn load_mesh(path: &Path) -> Result<LoadedFile, LoadMeshError> {
+    load_mesh_with(path, LoadOptions::default())
+}
+
+/// The same with leave to do more.
+///
+/// # Errors
+///
+/// As [`load_mesh`].
+pub fn load_mesh_with(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshError> {
     read(path, options).map_err(|kind| LoadMeshError {
         path: path.to_owned(),
         kind,
@@ -176,17 +185,21 @@ impl LoadedFile {
         }
     }
 
-    /// All parts that stand once as one mesh, part after part, without materials; and those that the file places itself.
-    pub fn into_single_mesh(self) -> (MeshBuilder, Vec<Part>) {
-        let (placed, single): (Vec<_>, Vec<_>) = self
-            .parts
-            .into_iter()
-            .partition(|part| !part.instances.is_empty());
+    /// Takes out the parts that the file places itself.
+    pub fn take_placed(&mut self) -> Vec<Part> {
+        let parts = std::mem::take(&mut self.parts).into_iter();
+        let (placed, single) = parts.partition(|part| !part.instances.is_empty());
+        self.parts = single;
+        placed
+    }
+
+    /// All parts as one mesh, part after part; the materials are dropped, and so is where the file places a part.
+    pub fn into_single_mesh(self) -> MeshBuilder {
         let mut whole = MeshBuilder::default();
-        for part in single {
+        for part in self.parts {
             whole.append(part.mesh);
         }
-        (whole, placed)
+        whole
     }
 }
 
@@ -317,7 +330,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let result = load_mesh(&path, LoadOptions::default());
+        let result = load_mesh(&path);
         if let Err(e) = &result {
             assert!(e.to_string().contains(name), "{e} does not name the file");
         }
@@ -336,12 +349,12 @@ mod tests {
 
     #[test]
     fn missing_and_empty_files_are_refused() {
-        let missing = load_mesh(Path::new("no/such/mesh.obj"), LoadOptions::default()).unwrap_err();
+        let missing = load_mesh(Path::new("no/such/mesh.obj")).unwrap_err();
         assert!(matches!(missing.kind, LoadMeshErrorKind::Read { .. }));
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("mesh.obj");
         std::fs::create_dir(&folder).unwrap();
-        let refused = load_mesh(&folder, LoadOptions::default()).unwrap_err();
+        let refused = load_mesh(&folder).unwrap_err();
         assert!(matches!(refused.kind, LoadMeshErrorKind::Read { .. }));
         for known in MESH_EXTENSIONS {
             let empty = load_bytes(&format!("mesh.{known}"), b"").unwrap_err();
@@ -361,7 +374,7 @@ mod tests {
         let mut file = load_bytes("two.obj", text).unwrap();
         assert_eq!(file.parts.len(), 2);
         file.project(Projection::Planar);
-        let (whole, _) = file.into_single_mesh();
+        let whole = file.into_single_mesh();
         assert_eq!(whole.texcoords.len(), whole.positions.len());
         for (p, st) in whole.positions.iter().zip(&whole.texcoords) {
             assert_eq!(*st, p.truncate() / 4.0);

@@ -469,8 +469,9 @@ impl Document {
         for (index, texture) in self.textures.iter().enumerate() {
             let place = format!("texture {index}");
             maybe_leads(&place, "sampler", texture.sampler, self.samplers.len())?;
-            for source in texture.sources() {
-                leads(&place, "image", source, self.images.len())?;
+            maybe_leads(&place, "image", texture.source, self.images.len())?;
+            for source in texture.extensions.values().map(|e| &e["source"]) {
+                Self::check_index(source, &place, "image", self.images.len())?;
             }
         }
         for (index, material) in self.materials.iter().enumerate() {
@@ -487,15 +488,31 @@ impl Document {
                 self.check_textures(value, place)?;
                 continue;
             }
-            let Some(index) = index.as_u64() else {
-                let problem =
-                    format!("its {key} has the index {index}; expected a whole number from 0");
-                return Err(malformed(place, problem));
-            };
-            let index = usize::try_from(index).unwrap_or(usize::MAX);
-            leads(place, "texture", index, self.textures.len())?;
+            Self::check_index(index, place, "texture", self.textures.len())?;
         }
         Ok(())
+    }
+
+    /// An index inside of what is not typed; none leads nowhere.
+    fn check_index(
+        index: &Value,
+        place: &str,
+        what: &'static str,
+        count: usize,
+    ) -> Result<(), LoadMeshErrorKind> {
+        if index.is_null() {
+            return Ok(());
+        }
+        let Some(index) = index.as_u64() else {
+            let problem = format!("its {what} is number {index}; expected a whole number from 0");
+            return Err(malformed(place, problem));
+        };
+        leads(
+            place,
+            what,
+            usize::try_from(index).unwrap_or(usize::MAX),
+            count,
+        )
     }
 
     fn check_animations(&self) -> Result<(), LoadMeshErrorKind> {
@@ -533,6 +550,11 @@ impl Primitive {
 }
 
 impl Accessor {
+    /// Whether it has no bytes of its own: all zeros, or the announcement of what a stream holds.
+    pub fn is_nothing(&self) -> bool {
+        self.buffer_view.is_none() && self.sparse.is_none()
+    }
+
     pub fn is_float(&self) -> bool {
         self.component_type == 5126
     }
@@ -562,14 +584,6 @@ impl Texture {
     pub fn source_of(&self, extension: &str) -> Option<usize> {
         let source = self.extensions.get(extension)?["source"].as_u64()?;
         Some(usize::try_from(source).unwrap_or(usize::MAX))
-    }
-
-    fn sources(&self) -> impl Iterator<Item = usize> + '_ {
-        let others = self
-            .extensions
-            .keys()
-            .filter_map(|name| self.source_of(name));
-        self.source.into_iter().chain(others)
     }
 }
 

@@ -220,11 +220,37 @@ impl Reader<'_> {
         material.and_then(|m| m["name"].as_str()).unwrap_or("")
     }
 
+    /// The transform that undoes the quantisation of a mesh's texture coordinates (KHR_mesh_quantization): the one that all textures of
+    /// material number `index` share. The mesh's coordinates take it in, so that a displacement map lies right, and the
+    /// material's textures do without.
+    pub fn dequantization(&self, index: usize) -> Option<UvTransform> {
+        self.document
+            .materials
+            .get(index)
+            .and_then(|m| self.shared_transform(m))
+    }
+
+    fn shared_transform(&self, m: &Value) -> Option<UvTransform> {
+        if !self.document.uses("KHR_mesh_quantization") {
+            return None;
+        }
+        let mut transforms = Vec::new();
+        each_texture(m, &mut |info| {
+            transforms.push(uv_transform(transform_of(info)))
+        });
+        let (first, others) = transforms.split_first()?;
+        others.iter().all(|other| other == first).then_some(*first)
+    }
+
     /// The sets of texture coordinates that the textures of material number `index` are read by, but for occlusion, which we do not read.
     pub fn texcoord_sets(&self, index: usize) -> BTreeSet<u32> {
         let mut sets = BTreeSet::new();
         if let Some(m) = self.document.materials.get(index) {
-            add_texcoord_sets(m, &mut sets);
+            each_texture(m, &mut |info| {
+                let set = transform_of(info)["texCoord"].as_u64();
+                let set = set.or(info["texCoord"].as_u64());
+                sets.insert(set.unwrap_or(0).try_into().unwrap_or(u32::MAX));
+            });
         }
         sets
     }
@@ -242,7 +268,10 @@ impl Reader<'_> {
         let index = usize::try_from(info["index"].as_u64()?).ok()?;
         let texture = self.textures.get(index)?.clone()?;
         Some(FileTextureUse {
-            uv: uv_transform(&info["extensions"]["KHR_texture_transform"]),
+            uv: match self.shared_transform(m) {
+                Some(_) => UvTransform::default(),
+                None => uv_transform(transform_of(info)),
+            },
             ..texture
         })
     }
@@ -268,19 +297,23 @@ fn uv_transform(t: &Value) -> UvTransform {
     }
 }
 
-fn add_texcoord_sets(m: &Value, sets: &mut BTreeSet<u32>) {
+/// Shows `visit` every reference of a material to a texture, but for occlusion, which is not read.
+fn each_texture(m: &Value, visit: &mut impl FnMut(&Value)) {
     for (key, value) in m.as_object().into_iter().flatten() {
         if key == "occlusionTexture" {
             continue;
         }
         if value["index"].is_u64() {
-            let transform = &value["extensions"]["KHR_texture_transform"]["texCoord"];
-            let set = transform.as_u64().or(value["texCoord"].as_u64());
-            sets.insert(set.unwrap_or(0).try_into().unwrap_or(u32::MAX));
+            visit(value);
         } else {
-            add_texcoord_sets(value, sets);
+            each_texture(value, visit);
         }
     }
+}
+
+/// The extension's object, if it is there.
+fn transform_of(info: &Value) -> &Value {
+    &info["extensions"]["KHR_texture_transform"]
 }
 
 fn number(m: &Value, pointer: &str, default: f32) -> f32 {

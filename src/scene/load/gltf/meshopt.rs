@@ -68,4 +68,4 @@ fn unzigzag(code: u32) -> u32 {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -137,13 +137,15 @@ impl<'a> Attributes<'a> {
         let packed = self.primitive.draco().zip(self.unpacked.as_ref());
         let packed =
             packed.and_then(|(draco, unpacked)| Some((*draco.attributes.get(semantic)?, unpacked)));
+        let accessor = &self.reader.document.accessors[index];
         let Some((id, unpacked)) = packed else {
-            return self
-                .accessor::<N>(semantic, index, kinds)
-                .map(|a| Some(Values::Accessor(a)));
+            if accessor.is_nothing() && (semantic == "POSITION" || self.unpacked.is_some()) {
+                return Err(self.nothing(semantic));
+            }
+            let accessor = self.accessor::<N>(semantic, index, kinds)?;
+            return Ok(Some(Values::Accessor(accessor)));
         };
         let what = format!("{} Draco stream", self.place);
-        let accessor = &self.reader.document.accessors[index];
         let values = unpacked.values::<N>(
             semantic,
             id,
@@ -155,6 +157,13 @@ impl<'a> Attributes<'a> {
             check_bounds(&values, accessor, &what)?;
         }
         Ok(Some(Values::Unpacked(values)))
+    }
+
+    /// The error that an accessor has no bytes where zeros cannot be meant.
+    fn nothing(&self, what: &str) -> LoadMeshErrorKind {
+        let problem =
+            format!("its {what} has no bytes; are they in an extension that is not read?");
+        malformed(self.place, problem)
     }
 
     /// The core specification knows no integers for texture coordinates but fractions, and some exporters do not say so.
@@ -191,6 +200,9 @@ impl<'a> Attributes<'a> {
         let triangles = match (&mut self.unpacked, self.primitive.indices) {
             // Whatever the mode, a stream holds single triangles.
             (Some(unpacked), _) => unpacked.take_triangles(),
+            (None, Some(indices)) if self.reader.document.accessors[indices].is_nothing() => {
+                return Err(self.nothing("indices"));
+            }
             (None, Some(indices)) => {
                 let what = format!("{} indices", self.place);
                 let accessor = self.reader.accessors.open_indices(indices, &what)?;
