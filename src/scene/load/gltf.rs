@@ -62,9 +62,10 @@ pub(super) fn read(
         joints: HashMap::new(),
         texcoords: TexcoordChoice::default(),
         parts: Parts::default(),
-        vertices: 0,
     };
-    for index in nodes::visible(&document, roots)? {
+    let visible = nodes::visible(&document, roots)?;
+    check_repetition(&document, &visible, buffers.len())?;
+    for index in visible {
         meshes.add(index)?;
     }
     warnings.extend(meshes.texcoords.warnings);
@@ -74,6 +75,55 @@ pub(super) fn read(
         warnings,
         files: buffers.files,
     })
+}
+
+/// Refuses a scene that would be out of all proportion to its bytes: a few of them can repeat a mesh any number of times.
+fn check_repetition(
+    document: &Document,
+    visible: &[usize],
+    bytes: usize,
+) -> Result<(), LoadMeshErrorKind> {
+    /// Vertices and instances that any file may have, and how many for each of its bytes.
+    const FREE: usize = 1 << 25;
+    const PER_BYTE: usize = 4;
+    let most = bytes.saturating_mul(PER_BYTE).saturating_add(FREE);
+    let count = |accessor: usize| document.accessors[accessor].count;
+    let of_primitive = |primitive: &document::Primitive| {
+        let vertices = primitive
+            .attributes
+            .get("POSITION")
+            .map_or(0, |&a| count(a));
+        // No more are kept than are used.
+        primitive
+            .indices
+            .map_or(vertices, |i| vertices.min(count(i)))
+    };
+    let meshes = document.meshes.iter();
+    let meshes: Vec<usize> = meshes
+        .map(|mesh| {
+            mesh.primitives
+                .iter()
+                .map(of_primitive)
+                .fold(0, usize::saturating_add)
+        })
+        .collect();
+    let mut total = 0_usize;
+    for node in visible.iter().map(|&index| &document.nodes[index]) {
+        let instances = node
+            .instancing()
+            .into_iter()
+            .flat_map(|i| i.attributes.values());
+        let instances = instances.map(|&a| count(a)).max().unwrap_or(0);
+        let vertices = node.mesh.map_or(0, |mesh| meshes[mesh as usize]);
+        total = total.saturating_add(vertices).saturating_add(instances);
+    }
+    if total > most {
+        let problem = format!(
+            "its nodes lay out {total} vertices and instances, of {bytes} bytes; at most {most} are read"
+        );
+        return Err(malformed("glTF document", problem));
+    }
+    Ok(())
 }
 
 /// Collects the meshes of nodes.
@@ -87,12 +137,7 @@ struct Meshes<'a> {
     joints: HashMap<u32, Rc<Joints>>,
     texcoords: TexcoordChoice,
     parts: Parts,
-    /// So far.
-    vertices: usize,
 }
-
-/// Most vertices of a file. A few bytes can name one mesh any number of times.
-const MAX_VERTICES: usize = 1 << 26;
 
 impl Meshes<'_> {
     /// The mesh of node number `index`, if it has one.
@@ -134,14 +179,6 @@ impl Meshes<'_> {
             let place = format!("mesh {mesh_index} primitive {number}");
             let set = self.texcoords.of(self.materials, primitive.material);
             let builder = reader.read(primitive, set, &pose, &place)?;
-            self.vertices += builder.positions.len();
-            if self.vertices > MAX_VERTICES {
-                return Err(LoadMeshErrorKind::Unsupported {
-                    what: format!(
-                        "a scene of more than {MAX_VERTICES} vertices, each as often as nodes repeat its mesh,"
-                    ),
-                });
-            }
             let mut builder = builder.transformed(&world);
             let dequantization = primitive
                 .material

@@ -1,6 +1,6 @@
 //! The bytes of a document: every buffer read once, every compressed view unpacked once, when it is first asked for.
 
-use std::cell::OnceCell;
+use std::cell::{Cell, OnceCell};
 use std::collections::HashMap;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -18,9 +18,16 @@ pub(super) struct Buffers<'a> {
     buffers: Vec<Bytes<'a>>,
     /// Per view, what its stream unpacks to. Views of the same stream share the place of the first of them.
     unpacked: Vec<(usize, OnceCell<Vec<u8>>)>,
+    /// Bytes that streams may still unpack to.
+    left: Cell<usize>,
     /// The files that were read.
     pub files: Vec<PathBuf>,
 }
+
+/// What streams may unpack to: so many bytes in any file, and so many for each byte of its buffers. Constant data shrinks by a
+/// factor of a thousand, but not all of a mesh is constant.
+const UNPACKED_FREE: usize = 64 << 20;
+const UNPACKED_PER_BYTE: usize = 64;
 
 /// A buffer.
 enum Bytes<'a> {
@@ -87,8 +94,13 @@ impl<'a> Buffers<'a> {
             }
             buffers.push(bytes);
         }
+        let read: usize = buffers.iter().filter_map(Bytes::get).map(<[u8]>::len).sum();
         Ok(Self {
             document,
+            left: Cell::new(
+                read.saturating_mul(UNPACKED_PER_BYTE)
+                    .saturating_add(UNPACKED_FREE),
+            ),
             buffers,
             unpacked: shared_streams(document),
             files: files.named,
@@ -106,9 +118,15 @@ impl<'a> Buffers<'a> {
             return Ok(bytes);
         }
         let packed = self.slice(stream.buffer, stream.byte_offset, stream.byte_length, index)?;
-        let bytes = meshopt::decode(stream, packed).map_err(|problem| {
-            malformed(&format!("buffer view {index}, meshopt stream"), problem)
-        })?;
+        let what = format!("buffer view {index}, meshopt stream");
+        let length = stream.count.saturating_mul(stream.byte_stride);
+        let Some(left) = self.left.get().checked_sub(length) else {
+            let problem =
+                format!("it unpacks to {length} bytes, out of all proportion to the file");
+            return Err(malformed(&what, problem));
+        };
+        self.left.set(left);
+        let bytes = meshopt::decode(stream, packed).map_err(|problem| malformed(&what, problem))?;
         Ok(unpacked.get_or_init(|| bytes))
     }
 

@@ -66,7 +66,7 @@ struct Scene {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Node {
-    pub name: Option<String>,
+    pub name: Option<Box<str>>,
     #[serde(default)]
     pub children: Box<[u32]>,
     pub mesh: Option<u32>,
@@ -106,7 +106,7 @@ fn yes() -> bool {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Mesh {
-    pub name: Option<String>,
+    pub name: Option<Box<str>>,
     pub primitives: Vec<Primitive>,
     #[serde(default)]
     pub weights: Box<[f32]>,

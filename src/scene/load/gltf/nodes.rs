@@ -24,19 +24,21 @@ pub(super) fn world_transforms(document: &Document) -> Result<Vec<Affine3A>, Loa
             return Err(malformed(&name(root), problem));
         }
     }
-    let mut worlds = vec![None; nodes.len()];
+    let mut worlds = vec![Affine3A::IDENTITY; nodes.len()];
+    let mut reached = vec![false; nodes.len()];
     let tops = (0..nodes.len()).filter(|&i| !has_parent[i]);
     let mut pending: Vec<_> = tops.map(|i| (i, Affine3A::IDENTITY)).collect();
     while let Some((index, parent)) = pending.pop() {
         let world = parent * local(&nodes[index], index)?;
-        worlds[index] = Some(world);
+        (worlds[index], reached[index]) = (world, true);
         let children = nodes[index].children.iter();
         pending.extend(children.map(|&child| (child as usize, world)));
     }
     // With one parent at most, what no top leads to goes round in a circle.
-    let all = worlds.into_iter().enumerate();
-    all.map(|(index, world)| world.ok_or_else(|| malformed(&name(index), "it is its own ancestor")))
-        .collect()
+    match reached.iter().position(|reached| !reached) {
+        Some(index) => Err(malformed(&name(index), "it is its own ancestor")),
+        None => Ok(worlds),
+    }
 }
 
 /// The visible nodes of the scene, in the order of the file: each before its children.
