@@ -14,17 +14,23 @@ use crate::scene::error::AssetError;
 use crate::surface::{DisplacementMap, Wrap};
 
 /// A channel of a picture, and how it goes on outside.
-type ChannelKey<W> = (PathBuf, Channel, W);
+type ChannelKey<File, Wraps> = (File, Channel, Wraps);
+
+/// A picture, what its numbers mean, and what they are multiplied by.
+type ColorKey<File> = (File, ColorSpace, Vec3);
+
+/// What was loaded, and by what it is known again.
+type Loaded<Key, Asset> = Vec<(Key, Arc<Asset>)>;
 
 /// What has been loaded so far.
 #[derive(Default)]
 pub(super) struct Assets {
-    heights: Vec<(ChannelKey<Wrap>, Arc<DisplacementMap>)>,
-    scalars: Vec<(ChannelKey<[Wrap; 2]>, Arc<ScalarImage>)>,
-    colors: Vec<((PathBuf, ColorSpace, Vec3), Arc<ColorImage>)>,
-    embedded_colors: Vec<((Arc<[u8]>, ColorSpace, Vec3), Arc<ColorImage>)>,
-    embedded_scalars: Vec<((Arc<[u8]>, Channel, [Wrap; 2]), Arc<ScalarImage>)>,
-    environments: Vec<(PathBuf, Arc<EnvironmentImage>)>,
+    heights: Loaded<ChannelKey<PathBuf, Wrap>, DisplacementMap>,
+    scalars: Loaded<ChannelKey<PathBuf, [Wrap; 2]>, ScalarImage>,
+    colors: Loaded<ColorKey<PathBuf>, ColorImage>,
+    embedded_colors: Loaded<ColorKey<Arc<[u8]>>, ColorImage>,
+    embedded_scalars: Loaded<ChannelKey<Arc<[u8]>, [Wrap; 2]>, ScalarImage>,
+    environments: Loaded<PathBuf, EnvironmentImage>,
 }
 
 impl Assets {
@@ -113,7 +119,7 @@ impl Assets {
 
 /// What `known` has for `key`, else what `load` gives. A scene names few files: no hashing is needed.
 fn once<K: PartialEq, T, E: Into<AssetError>>(
-    known: &mut Vec<(K, Arc<T>)>,
+    known: &mut Loaded<K, T>,
     key: K,
     load: impl FnOnce() -> Result<T, E>,
 ) -> Result<Arc<T>, AssetError> {

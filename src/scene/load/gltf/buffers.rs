@@ -32,7 +32,7 @@ const UNPACKED_PER_BYTE: usize = 64;
 /// A buffer.
 enum Bytes<'a> {
     Chunk(&'a [u8]),
-    Own(Rc<[u8]>),
+    Own(Rc<Vec<u8>>),
     /// Of a compressed file, for readers that cannot unpack it.
     Fallback,
 }
@@ -41,7 +41,7 @@ enum Bytes<'a> {
 enum Source {
     Chunk,
     Fallback,
-    Bytes(Rc<[u8]>),
+    Bytes(Rc<Vec<u8>>),
     File(PathBuf),
 }
 
@@ -65,7 +65,7 @@ impl<'a> Buffers<'a> {
                     ));
                 }
                 Some(uri) => match uris.resolve(uri, &what)? {
-                    Resource::Bytes(bytes) => Source::Bytes(bytes.into()),
+                    Resource::Bytes(bytes) => Source::Bytes(Rc::new(bytes)),
                     Resource::File(file) => Source::File(file),
                 },
             })
@@ -193,33 +193,40 @@ fn shared_streams(document: &Document) -> Vec<(usize, OnceCell<Vec<u8>>)> {
         .collect()
 }
 
+/// What is known of a file: how many bytes of it are wanted, and those bytes.
+#[derive(Default)]
+struct Known {
+    wanted: usize,
+    bytes: Option<Rc<Vec<u8>>>,
+}
+
 /// The files that buffers are read from.
 #[derive(Default)]
 struct Files {
     /// By the one path that all names of a file lead to.
-    known: HashMap<PathBuf, (usize, Option<Rc<[u8]>>)>,
+    known: HashMap<PathBuf, Known>,
     named: Vec<PathBuf>,
 }
 
 impl Files {
     /// As many bytes of the file will be needed, or more.
     fn want(&mut self, file: &Path, bytes: usize) {
-        let (wanted, _) = self.known.entry(identity(file)).or_default();
-        *wanted = bytes.max(*wanted);
+        let known = self.known.entry(identity(file)).or_default();
+        known.wanted = bytes.max(known.wanted);
     }
 
     /// The first bytes of the file, as many as are wanted or there are.
-    fn read(&mut self, file: &Path, what: &str) -> Result<Rc<[u8]>, LoadMeshErrorKind> {
-        let (wanted, known) = self.known.entry(identity(file)).or_default();
-        if let Some(bytes) = known {
+    fn read(&mut self, file: &Path, what: &str) -> Result<Rc<Vec<u8>>, LoadMeshErrorKind> {
+        let known = self.known.entry(identity(file)).or_default();
+        if let Some(bytes) = &known.bytes {
             return Ok(bytes.clone());
         }
-        let bytes = read_start(file, *wanted).map_err(|source| LoadMeshErrorKind::Read {
+        let bytes = read_start(file, known.wanted).map_err(|source| LoadMeshErrorKind::Read {
             what: format!("{what}, {}", file.display()),
             source,
         })?;
         self.named.push(file.to_owned());
-        Ok(known.insert(bytes.into()).clone())
+        Ok(known.bytes.insert(Rc::new(bytes)).clone())
     }
 }
 

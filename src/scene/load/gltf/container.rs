@@ -22,7 +22,8 @@ pub(super) fn open(bytes: &[u8]) -> Result<Container<'_>, LoadMeshErrorKind> {
         });
     }
     let inside = checked_header(bytes)?;
-    let (kind, json, mut rest) = chunk(inside)?;
+    let (first, mut rest) = chunk(inside)?;
+    let Chunk { kind, data: json } = first;
     if kind != b"JSON" {
         let problem = format!(
             "its first chunk is {:?}, not JSON",
@@ -33,7 +34,7 @@ pub(super) fn open(bytes: &[u8]) -> Result<Container<'_>, LoadMeshErrorKind> {
     let mut binary = None;
     // Less than a chunk's header is padding.
     while rest.len() >= 8 && binary.is_none() {
-        let (kind, data, after) = chunk(rest)?;
+        let (Chunk { kind, data }, after) = chunk(rest)?;
         // Chunks of other kinds are to be ignored.
         binary = (kind == b"BIN\0").then_some(data);
         rest = after;
@@ -69,14 +70,19 @@ fn checked_header(bytes: &[u8]) -> Result<&[u8], LoadMeshErrorKind> {
     })
 }
 
-/// The kind and the data of the first chunk, and what follows it.
-fn chunk(bytes: &[u8]) -> Result<(&[u8; 4], &[u8], &[u8]), LoadMeshErrorKind> {
+struct Chunk<'a> {
+    kind: &'a [u8; 4],
+    data: &'a [u8],
+}
+
+/// The first chunk, and what follows it.
+fn chunk(bytes: &[u8]) -> Result<(Chunk<'_>, &[u8]), LoadMeshErrorKind> {
     let parts = || {
         let (length, rest) = bytes.split_first_chunk::<4>()?;
         let (kind, rest) = rest.split_first_chunk::<4>()?;
         let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;
         let (data, rest) = rest.split_at_checked(length)?;
-        Some((kind, data, rest))
+        Some((Chunk { kind, data }, rest))
     };
     parts().ok_or_else(|| {
         malformed(

@@ -330,7 +330,7 @@ fn containers_are_sound_or_refused() {
     }
     let bad = [
         file(&[bin.clone(), json_chunk.clone()]),
-        file(&[json_chunk.clone()]),
+        file(std::slice::from_ref(&json_chunk)),
         file(&[]),
         file(&[json_chunk.clone(), bin[..bin.len() - 1].to_vec()]),
         file(&[chunk(b"JSON", &text.as_bytes()[..100]), bin.clone()]),
