@@ -294,7 +294,8 @@ impl<'a> Accessors<'a> {
             .transpose()?;
         Ok(Accessor {
             kind,
-            normalized: accessor.normalized,
+            // Joints are indices, whatever is said of them.
+            normalized: accessor.normalized && kinds != JOINTS,
             count,
             base,
             sparse,

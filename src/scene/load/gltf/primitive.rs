@@ -150,7 +150,7 @@ impl<'a> Attributes<'a> {
             semantic,
             id,
             kinds,
-            accessor.normalized || self.is_fraction(semantic),
+            (accessor.normalized && kinds != JOINTS) || self.is_fraction(semantic),
         );
         let values = values.map_err(|problem| malformed(&what, problem))?;
         if semantic == "POSITION" {

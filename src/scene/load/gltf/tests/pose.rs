@@ -296,6 +296,7 @@ fn a_second_set_of_joints_counts_too() {
     let base = data.floats(&CORNERS);
     let joints = data.numbers(5121, "VEC4", 3, vec![0; 12]);
     let others = data.numbers(5121, "VEC4", 3, vec![1; 12]);
+    data.accessors[others]["normalized"] = json!(true);
     let weights = data.floats(&[[0.25, 0.0, 0.0, 0.0]; 3]);
     let more = data.floats(&[[0.75, 0.0, 0.0, 0.0]; 3]);
     let attributes = |sets: usize| {
