@@ -72,9 +72,9 @@ impl<'a> Buffers<'a> {
         });
         let sources = sources.collect::<Result<Vec<_>, _>>()?;
         let mut files = Files::default();
-        for (buffer, source) in document.buffers.iter().zip(&sources) {
+        for (index, source) in sources.iter().enumerate() {
             if let Source::File(file) = source {
-                files.want(file, buffer.byte_length);
+                files.want(file, document.buffers[index].byte_length, &name(index))?;
             }
         }
         let mut buffers = Vec::with_capacity(sources.len());
@@ -86,11 +86,8 @@ impl<'a> Buffers<'a> {
                 Source::File(file) => Bytes::Own(files.read(&file, &name(index))?),
             };
             let wanted = document.buffers[index].byte_length;
-            if let Some(found) = bytes.get().map(<[u8]>::len)
-                && found < wanted
-            {
-                let problem = format!("{found} bytes found, {wanted} expected");
-                return Err(malformed(&name(index), problem));
+            if let Some(found) = bytes.get() {
+                check_length(found.len() as u64, wanted, &name(index))?;
             }
             buffers.push(bytes);
         }
@@ -209,10 +206,17 @@ struct Files {
 }
 
 impl Files {
-    /// As many bytes of the file will be needed, or more.
-    fn want(&mut self, file: &Path, bytes: usize) {
+    /// As many bytes of the file will be needed, or more. A file that is too short for that is not read in vain.
+    fn want(&mut self, file: &Path, bytes: usize, what: &str) -> Result<(), LoadMeshErrorKind> {
+        // What else may be wrong with the file is told when it is opened.
+        if let Ok(found) = file.metadata()
+            && found.is_file()
+        {
+            check_length(found.len(), bytes, what)?;
+        }
         let known = self.known.entry(identity(file)).or_default();
         known.wanted = bytes.max(known.wanted);
+        Ok(())
     }
 
     /// The first bytes of the file, as many as are wanted or there are.
@@ -228,6 +232,14 @@ impl Files {
         self.named.push(file.to_owned());
         Ok(known.bytes.insert(Rc::new(bytes)).clone())
     }
+}
+
+fn check_length(found: u64, wanted: usize, what: &str) -> Result<(), LoadMeshErrorKind> {
+    if found >= u64::try_from(wanted).unwrap_or(u64::MAX) {
+        return Ok(());
+    }
+    let problem = format!("{found} bytes found, {wanted} expected");
+    Err(malformed(what, problem))
 }
 
 fn read_start(file: &Path, wanted: usize) -> io::Result<Vec<u8>> {

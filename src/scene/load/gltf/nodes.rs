@@ -26,13 +26,15 @@ pub(super) fn world_transforms(document: &Document) -> Result<Vec<Affine3A>, Loa
     }
     let mut worlds = vec![Affine3A::IDENTITY; nodes.len()];
     let mut reached = vec![false; nodes.len()];
-    let tops = (0..nodes.len()).filter(|&i| !has_parent[i]);
-    let mut pending: Vec<_> = tops.map(|i| (i, Affine3A::IDENTITY)).collect();
-    while let Some((index, parent)) = pending.pop() {
-        let world = parent * local(&nodes[index], index)?;
-        (worlds[index], reached[index]) = (world, true);
-        let children = nodes[index].children.iter();
-        pending.extend(children.map(|&child| (child as usize, world)));
+    let mut pending = Vec::new();
+    for top in (0..nodes.len()).filter(|&i| !has_parent[i]) {
+        pending.push((top, Affine3A::IDENTITY));
+        while let Some((index, parent)) = pending.pop() {
+            let world = parent * local(&nodes[index], index)?;
+            (worlds[index], reached[index]) = (world, true);
+            let children = nodes[index].children.iter();
+            pending.extend(children.map(|&child| (child as usize, world)));
+        }
     }
     // With one parent at most, what no top leads to goes round in a circle.
     match reached.iter().position(|reached| !reached) {
