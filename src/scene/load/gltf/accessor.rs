@@ -228,7 +228,7 @@ impl Accessor<'_> {
 impl<'a> Accessors<'a> {
     pub fn new(document: &'a Document, buffers: &'a Buffers<'a>) -> Self {
         /// What any file may have.
-        const FREE: usize = 1 << 20;
+        const FREE: usize = 1 << 22;
         Self {
             document,
             buffers,

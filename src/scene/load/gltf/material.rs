@@ -4,16 +4,16 @@
 //! Read from the plain JSON, since extensions add to it. What is missing or of another type than it should be is as if it were not
 //! there; numbers out of range are clamped.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use serde_json::Value;
 
-use super::LoadMeshErrorKind;
 use super::buffers::Buffers;
 use super::document::{Document, Texture};
 use super::uri::{Resource, Uris};
+use super::{LoadMeshErrorKind, malformed};
 use crate::scene::load::{
     FileColor, FileDetail, FileMaterial, FileScalar, FileTexture, FileTextureUse,
 };
@@ -45,8 +45,8 @@ impl<'a> Reader<'a> {
         uris: Uris,
         warnings: &mut Vec<String>,
     ) -> Result<Self, LoadMeshErrorKind> {
-        let indices = 0..document.images.len();
-        let images = indices.map(|index| image(document, index, buffers, uris));
+        let mut pictures = Pictures::new(document, buffers, uris);
+        let images = (0..document.images.len()).map(|index| pictures.get(index));
         let images = images.collect::<Result<Vec<_>, _>>()?;
         let mut textures = Vec::with_capacity(document.textures.len());
         for (index, texture) in document.textures.iter().enumerate() {
@@ -68,24 +68,55 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Picture number `index`, if the document says where it is.
-fn image(
-    document: &Document,
-    index: usize,
-    buffers: &Buffers,
-    uris: Uris,
-) -> Result<Option<FileTexture>, LoadMeshErrorKind> {
-    let image = &document.images[index];
-    Ok(match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => Some(match uris.resolve(uri, &format!("image {index}"))? {
-            Resource::Bytes(bytes) => FileTexture::Embedded(bytes.into()),
-            Resource::File(file) => FileTexture::Path(file),
-        }),
-        (None, Some(view)) => Some(FileTexture::Embedded(Arc::from(
-            buffers.view(view as usize)?,
-        ))),
-        (None, None) => None,
-    })
+/// Copies the pictures that buffers hold, each once: they outlive the buffers.
+struct Pictures<'a> {
+    document: &'a Document,
+    buffers: &'a Buffers<'a>,
+    uris: Uris<'a>,
+    /// By where they lie.
+    copied: HashMap<*const [u8], Arc<[u8]>>,
+    /// Bytes that may still be copied: pictures do not overlap.
+    left: usize,
+}
+
+impl<'a> Pictures<'a> {
+    fn new(document: &'a Document, buffers: &'a Buffers<'a>, uris: Uris<'a>) -> Self {
+        Self {
+            document,
+            buffers,
+            uris,
+            copied: HashMap::new(),
+            left: buffers.len(),
+        }
+    }
+
+    /// Picture number `index`, if the document says where it is.
+    fn get(&mut self, index: usize) -> Result<Option<FileTexture>, LoadMeshErrorKind> {
+        let image = &self.document.images[index];
+        let what = format!("image {index}");
+        Ok(match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => Some(match self.uris.resolve(uri, &what)? {
+                Resource::Bytes(bytes) => FileTexture::Embedded(bytes.into()),
+                Resource::File(file) => FileTexture::Path(file),
+            }),
+            (None, Some(view)) => {
+                let bytes = self.buffers.view(view as usize)?;
+                Some(FileTexture::Embedded(self.copy(bytes, &what)?))
+            }
+            (None, None) => None,
+        })
+    }
+
+    fn copy(&mut self, bytes: &[u8], what: &str) -> Result<Arc<[u8]>, LoadMeshErrorKind> {
+        if let Some(copy) = self.copied.get(&(&raw const *bytes)) {
+            return Ok(copy.clone());
+        }
+        let left = self.left.checked_sub(bytes.len());
+        self.left = left.ok_or_else(|| malformed(what, "it overlaps with other pictures"))?;
+        let copy: Arc<[u8]> = bytes.into();
+        self.copied.insert(bytes, copy.clone());
+        Ok(copy)
+    }
 }
 
 /// Why a texture has no picture.

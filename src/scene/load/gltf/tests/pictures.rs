@@ -74,3 +74,22 @@ fn a_picture_inside_the_file_is_copied_once() {
     assert_eq!(base[..], binary()[48..64]);
     assert!(Arc::ptr_eq(&base, &emission));
 }
+
+#[test]
+fn pictures_that_overlap_are_refused_once_they_outgrow_the_file() {
+    let mut document = document();
+    let view = |i: usize| json!({ "buffer": 0, "byteOffset": i, "byteLength": 70 });
+    let views = document["bufferViews"].as_array_mut().unwrap();
+    views.extend([view(0), view(0), view(1)]);
+    let mut load = |images: &[usize]| {
+        let images: Vec<Value> = images.iter().map(|i| json!({ "bufferView": i })).collect();
+        document["images"] = json!(images);
+        load(&document)
+    };
+    assert!(load(&[3, 3, 4, 3]).is_ok());
+    let error = load(&[3, 5]).unwrap_err().to_string();
+    assert!(
+        error.contains("image 1") && error.contains("overlaps"),
+        "{error}"
+    );
+}

@@ -59,7 +59,7 @@ fn sparse_elements_replace_those_of_the_base_or_zeros() {
     for broken in [[2, 1], [1, 1], [1, 3]] {
         assert!(sparse(broken, true, 3).is_err(), "{broken:?}");
     }
-    let error = sparse([0, 2], false, 3 << 20).unwrap_err();
+    let error = sparse([0, 2], false, 3 << 22).unwrap_err();
     assert!(error.to_string().contains("without bytes"), "{error}");
 }
 
