@@ -21,8 +21,8 @@ use std::time::Instant;
 use common::timing::{Query, Times, option, trace, word};
 use prismarch::demo::{DEMOS, Demo, WriteOptions};
 use prismarch::embree::{
-    Device, DeviceOptions, EmbreeOptions, EmbreeTracer, Geometry, HitTest, Instance, Scene,
-    SceneBuilder, SceneOptions, TriangleGeometry, UserGeometry,
+    Device, DeviceOptions, EmbreeError, EmbreeOptions, EmbreeTracer, Geometry, HitTest, Instance,
+    Scene, SceneBuilder, SceneOptions, TriangleGeometry, UserGeometry,
 };
 use prismarch::prism::{PrismHit, Prisms};
 use prismarch::ray::{Aabb, Ray};
@@ -208,13 +208,13 @@ impl HitTest for Hollow {
 }
 
 /// The world with hollow prisms.
-fn hollow(world: &World) -> Result<Scene, prismarch::embree::EmbreeError> {
+fn hollow(world: &World) -> Result<Scene, EmbreeError> {
     let device = Device::new(&DeviceOptions::default())?;
     let options = SceneOptions {
         robust: true,
         ..SceneOptions::default()
     };
-    let geometry = |object: &Object| -> Result<Geometry, _> {
+    let geometry = |object: &Object| -> Result<Geometry, EmbreeError> {
         Ok(match &object.shape {
             Shape::Displaced(prisms) => {
                 UserGeometry::new(&device, Arc::new(Hollow(prisms.clone())))?.into()

@@ -11,6 +11,7 @@ use super::picture::Target;
 use super::render::Job;
 use crate::demo::{DEMOS, Demo, WriteOptions, digest};
 use crate::files::Outputs;
+use crate::scene::load::LoadOptions;
 
 /// Make a ready scene and a picture of it
 ///
@@ -95,6 +96,7 @@ fn render(args: &Args, scene: &Path, picture: &Path) -> Result<(), CliError> {
         scene,
         film: &args.film,
         set: &[],
+        load: LoadOptions::default(),
         integrator: None,
         samples: None,
         resume: false,

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::engine::EngineArgs;
 use super::error::CliError;
+use super::load::LoadArgs;
 use super::memory::Memory;
 use crate::files::Outputs;
 use crate::prism::{March, PrismOptions, Step};
@@ -29,6 +30,8 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    load: LoadArgs,
+    #[command(flatten)]
     engine: EngineArgs,
 }
 
@@ -38,7 +41,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     args.engine.start_threads()?;
     let outputs = Outputs::new();
     outputs.spare([&args.scene])?;
-    let loaded = Loaded::from_file(&args.scene)?;
+    let loaded = Loaded::from_file_with(&args.scene, &[], args.load.options())?;
     outputs.spare(&loaded.files)?;
     super::warn(&loaded.warnings);
     let world = loaded.scene.world()?;

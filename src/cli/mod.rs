@@ -10,6 +10,7 @@ mod film;
 mod hits;
 mod info;
 mod interrupt;
+mod load;
 mod march;
 mod memory;
 mod merge;

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
 use super::hits;
+use super::load::LoadArgs;
 use super::march::MarchArgs;
 use super::parse;
 use super::rays::{Layout, RayError, RayReader, Row};
@@ -53,6 +54,8 @@ pub struct Args {
     /// Table of hits, - for standard output
     #[arg(short, long, value_name = "HITS.csv", default_value = "-")]
     output: PathBuf,
+    #[command(flatten)]
+    load: LoadArgs,
     #[command(flatten)]
     engine: EngineArgs,
 }
@@ -214,8 +217,9 @@ impl Args {
         let SurfaceArgs {
             mesh, map, scale, ..
         } = &self.surface;
+        let options = self.load.options();
         match (&self.scene, mesh, map, scale) {
-            (Some(scene), ..) => Ok(Loaded::from_file(scene)?),
+            (Some(scene), ..) => Ok(Loaded::from_file_with(scene, &[], options)?),
             (None, Some(mesh), Some(map), &Some(scale)) => {
                 let Ok(channel): Result<Channel, _> = self.surface.channel.parse();
                 Ok(Loaded::from_mesh_and_map(&MeshAndMap {
@@ -231,6 +235,7 @@ impl Args {
                         uv: UvTransform::default(),
                     },
                     prisms: PrismOptions::default(),
+                    options,
                 })?)
             }
             _ => Err(CliError::Usage(

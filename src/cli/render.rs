@@ -11,6 +11,7 @@ use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
 use super::film::FilmArgs;
 use super::interrupt::Interrupt;
+use super::load::LoadArgs;
 use super::march::MarchArgs;
 use super::memory::Memory;
 use super::parse;
@@ -20,6 +21,7 @@ use super::stats::{Clock, Seconds, Stats};
 use crate::files::Outputs;
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
 use crate::render::{Control, Outcome, RenderInput};
+use crate::scene::load::LoadOptions;
 use crate::scene::{Aov, AovSet, Film, Integrator, Loaded, Scene, View};
 use crate::trace::World;
 
@@ -67,6 +69,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
     #[command(flatten)]
+    load: LoadArgs,
+    #[command(flatten)]
     engine: EngineArgs,
     /// Print errors and warnings only
     #[arg(short, long)]
@@ -87,6 +91,8 @@ pub struct Job<'a> {
     pub film: &'a FilmArgs,
     /// Values that win over the scene's, and lose to other options.
     pub set: &'a [String],
+    /// What mesh files may do.
+    pub load: LoadOptions,
     /// The name of an integrator that wins over the scene's.
     pub integrator: Option<&'a str>,
     /// Which samples; `None` for all.
@@ -123,6 +129,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         outputs,
         film: &args.film,
         set: &args.set,
+        load: args.load.options(),
         integrator: args.integrator.as_deref(),
         samples: args.samples.clone(),
         resume: args.resume,
@@ -138,7 +145,7 @@ impl Job<'_> {
     /// Loads, builds, renders, writes, and says so in one line.
     pub fn run(mut self) -> Result<(), CliError> {
         let mut clock = Clock::start();
-        let mut loaded = Loaded::from_file_with(self.scene, self.set)?;
+        let mut loaded = Loaded::from_file_with(self.scene, self.set, self.load)?;
         self.spare(&loaded.files)?;
         super::warn(&loaded.warnings);
         self.film.apply(&mut loaded.scene.film)?;

@@ -63,11 +63,11 @@ impl fmt::Debug for ColorImage {
 
 impl ColorImage {
     /// Linear RGB at texture coordinates `st`: bilinear in linear light, pixel centres at (i + 0.5) / width, v up.
-    /// Coordinates that are not finite read as 0.
-    pub fn sample(&self, st: Vec2, wrap: Wrap) -> Vec3 {
+    /// Outside it goes on by the wrap modes across and up. Coordinates that are not finite read as 0.
+    pub fn sample(&self, st: Vec2, [across, up]: [Wrap; 2]) -> Vec3 {
         let st = if st.is_finite() { st } else { Vec2::ZERO };
-        let ([x0, x1], fx) = cell(st.x, self.width, wrap);
-        let ([y0, y1], fy) = cell(st.y, self.height, wrap);
+        let ([x0, x1], fx) = cell(st.x, self.width, across);
+        let ([y0, y1], fy) = cell(st.y, self.height, up);
         let bottom = self.pixel(x0, y0).lerp(self.pixel(x1, y0), fx);
         let top = self.pixel(x0, y1).lerp(self.pixel(x1, y1), fx);
         bottom.lerp(top, fy)

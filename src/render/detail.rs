@@ -40,14 +40,9 @@ pub fn normal(detail: &Detail, point: &SurfacePoint, tangents: Option<[Vec3; 2]>
 
 /// dh/ds and dh/dt along the mesh's texture coordinates, world units.
 fn slope(heights: &ScalarTexture, texcoord: Vec2) -> Vec2 {
-    let (width, height) = heights.map.size();
-    let size = Vec2::new(width as f32, height as f32);
     let uv = heights.uv.to_affine();
-    let texel = heights
-        .map
-        .to_texel(uv.transform_point2(texcoord).as_dvec2());
-    let by_texel = heights.map.smooth_gradient(texel).as_vec2();
-    heights.factor * (uv.matrix2.transpose() * (by_texel * size))
+    let gradient = heights.image.smooth_gradient(uv.transform_point2(texcoord));
+    heights.factor * (uv.matrix2.transpose() * gradient)
 }
 
 #[cfg(test)]
@@ -55,9 +50,9 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::image::{ColorImage, ColorPixels};
+    use crate::image::{ColorImage, ColorPixels, ScalarImage};
     use crate::scene::{Coordinates, Texture};
-    use crate::surface::{DisplacementMap, Texels, UvTransform, Wrap};
+    use crate::surface::{Texels, UvTransform, Wrap};
 
     fn point() -> SurfacePoint {
         SurfacePoint {
@@ -78,10 +73,10 @@ mod tests {
     #[test]
     fn a_bump_ramp_tilts_by_its_slope() {
         let ramp = Texels::F32((0..64 * 8).map(|i| (i % 64) as f32 / 64.0).collect());
-        let map = Arc::new(DisplacementMap::new(64, 8, ramp, Wrap::Clamp).unwrap());
+        let image = Arc::new(ScalarImage::new(64, 8, ramp, [Wrap::Clamp; 2]).unwrap());
         let slope = |uv: UvTransform| {
             let bump = ScalarTexture {
-                map: map.clone(),
+                image: image.clone(),
                 uv,
                 factor: 0.3,
             };
@@ -113,7 +108,7 @@ mod tests {
                 height: 1,
                 pixels: ColorPixels::Linear(vec![rgb]),
             }),
-            wrap: Wrap::Repeat,
+            wrap: [Wrap::Repeat; 2],
             uv: UvTransform::default(),
             coordinates: Coordinates::Uv,
         };

@@ -4,8 +4,6 @@ mod assets;
 mod frame;
 mod materials;
 
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::f32::consts::PI;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -15,7 +13,7 @@ use glam::{Affine3A, Vec3};
 
 use super::error::{AssetError, SceneError};
 use super::file::{DisplacementTable, Keyed, LightTable, MeshTable, SCALE, SceneFile, default_sun};
-use super::load::{FileDisplacement, load_mesh};
+use super::load::{FileDisplacement, FileMaterial, LoadOptions, Part, conjugated, load_mesh_with};
 use super::{Camera, Film, Integrator, Light, Material, ObjectShape, Scene, SceneObject};
 use crate::image::Channel;
 use crate::prism::{March, PrismOptions};
@@ -68,17 +66,24 @@ pub struct MeshAndMap {
     pub displacement: Displacement,
     /// How its prisms are made.
     pub prisms: PrismOptions,
+    /// What the mesh file may do.
+    pub options: LoadOptions,
 }
 
 impl Loaded {
     /// Loads the scene file at `path` and every file it names.
     pub fn from_file(path: &Path) -> Result<Self, SceneError> {
-        Self::from_file_with(path, &[])
+        Self::from_file_with(path, &[], LoadOptions::default())
     }
 
     /// The same with values laid over those of the file: `KEY=VALUE` in TOML, like `film.spp=64`,
     /// `material.rock.roughness=0.2` or `light.0.strength=2`. Items of lists go by number or name.
-    pub fn from_file_with(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+    /// `options` say what its mesh files may do.
+    pub fn from_file_with(
+        path: &Path,
+        overrides: &[String],
+        options: LoadOptions,
+    ) -> Result<Self, SceneError> {
         let file = SceneFile::read(path, overrides)?;
         let mut builder = Builder::default();
         for material in &file.materials {
@@ -86,7 +91,7 @@ impl Loaded {
             builder.materials.push(material);
         }
         for mesh in &file.meshes {
-            builder.mesh(mesh)?;
+            builder.mesh(mesh, options)?;
         }
         let lights = match &file.lights[..] {
             [] if builder.materials.iter().any(Material::is_emissive) => Vec::new(),
@@ -111,31 +116,45 @@ impl Loaded {
         self.eye.as_ref().map(|eye| eye.refuse(found, expected))
     }
 
-    /// The scene of one displaced mesh, seen by the default camera. The parts of the file become one object.
+    /// The scene of one displaced mesh, seen by the default camera. The parts of the file become one object, but for those that
+    /// it places many times.
     pub fn from_mesh_and_map(source: &MeshAndMap) -> Result<Self, AssetError> {
         let mut builder = Builder::default();
         let MeshAndMap { mesh, map, .. } = source;
         let map = builder
             .assets
             .heights(map, &source.channel, source.wrap, source.nodata)?;
-        let mut file = load_mesh(mesh)?;
+        let mut file = load_mesh_with(mesh, source.options)?;
         builder.files.append(&mut file.files);
         builder.warn_all(mesh, std::mem::take(&mut file.warnings));
         if let Some(projection) = source.texcoords {
             file.project(projection);
         }
         let name = stem(mesh);
+        let placed = file.take_placed();
         let whole = file.into_single_mesh();
-        let whole = builder.base_mesh(mesh, &name, whole, &Shaping::default())?;
-        let surface = displaced(&name, whole, (&source.map, &map), source.displacement)?;
-        let material = builder.default_material();
-        builder.objects.push(SceneObject {
-            name,
-            shape: ObjectShape::Displaced(Arc::new(surface), source.prisms),
-            instances: Vec::new(),
-            mask: u32::MAX,
-            material,
+        let whole = (!whole.triangles.is_empty()).then_some((name.clone(), whole, Vec::new()));
+        let placed = placed.into_iter().map(|part| {
+            let Part {
+                name: own,
+                mesh,
+                instances,
+                ..
+            } = part;
+            (format!("{name}.{own}"), mesh, instances)
         });
+        for (name, part, instances) in whole.into_iter().chain(placed) {
+            let base = builder.base_mesh(mesh, &name, part, &Shaping::default())?;
+            let surface = displaced(&name, base, (&source.map, &map), source.displacement)?;
+            let material = builder.default_material();
+            builder.objects.push(SceneObject {
+                name,
+                shape: ObjectShape::Displaced(Arc::new(surface), source.prisms),
+                instances,
+                mask: u32::MAX,
+                material,
+            });
+        }
         let camera = frame::default_camera(frame::bounds(&builder.objects));
         Ok(builder.finish(
             mesh,
@@ -181,7 +200,7 @@ struct Builder {
 }
 
 impl Builder {
-    fn mesh(&mut self, table: &MeshTable) -> Result<(), SceneError> {
+    fn mesh(&mut self, table: &MeshTable, options: LoadOptions) -> Result<(), SceneError> {
         let path = &table.file.value;
         let asset = |source: AssetError| table.file.asset(source);
         let named = self.material_index(table.material.as_ref())?;
@@ -192,14 +211,15 @@ impl Builder {
             crease_angle: table.crease_angle,
             join: table.join,
         };
-        let mut loaded = load_mesh(path).map_err(|e| asset(e.into()))?;
+        let mut loaded = load_mesh_with(path, options).map_err(|e| asset(e.into()))?;
         if let Some(projection) = table.texcoords {
             loaded.project(projection);
         }
         self.files.append(&mut loaded.files);
         self.warn_all(path, loaded.warnings);
         let single = loaded.parts.len() == 1;
-        let mut of_file = HashMap::new();
+        // By what they are: several may have one name, or none.
+        let mut of_file: Vec<(FileMaterial, usize)> = Vec::new();
         for part in loaded.parts {
             let name = if single {
                 name.clone()
@@ -216,9 +236,13 @@ impl Builder {
                 .map(|m| if displaces { m.displaced() } else { m });
             let material = match (named, of_part) {
                 (Some(index), _) => index,
-                (None, Some(material)) => match of_file.entry(material.name.clone()) {
-                    Entry::Occupied(known) => *known.get(),
-                    Entry::Vacant(new) => *new.insert(self.file_material(path, material)),
+                (None, Some(material)) => match of_file.iter().find(|(m, _)| *m == material) {
+                    Some((_, known)) => *known,
+                    None => {
+                        let index = self.file_material(path, material.clone());
+                        of_file.push((material, index));
+                        index
+                    }
                 },
                 (None, None) => self.default_material(),
             };
@@ -237,7 +261,7 @@ impl Builder {
             self.objects.push(SceneObject {
                 name,
                 shape,
-                instances: table.instances.clone(),
+                instances: placements(&table.instances, &part.instances, &table.transform),
                 mask: table.mask,
                 material,
             });
@@ -466,6 +490,20 @@ fn told(joined: &Joined) -> Option<String> {
         let parts = parts.join(", ");
         format!("joined what differs by rounding: {parts} (join = 0 keeps them apart)")
     })
+}
+
+/// Where an object stands: the scene's instances, of what the file places itself. `transform` has moved the mesh.
+fn placements(scene: &[Affine3A], file: &[Affine3A], transform: &Affine3A) -> Vec<Affine3A> {
+    if file.is_empty() {
+        return scene.to_vec();
+    }
+    // A scene's transform has an inverse: it scales nothing to nothing.
+    let own = conjugated(file.iter().copied(), transform).unwrap_or_default();
+    if scene.is_empty() {
+        return own;
+    }
+    let placed = |outer: &Affine3A| own.iter().map(|inner| *outer * *inner).collect::<Vec<_>>();
+    scene.iter().flat_map(placed).collect()
 }
 
 fn displaced(

@@ -5,7 +5,7 @@ use std::fmt::{self, Write};
 use glam::Affine3A;
 use twox_hash::xxhash3_128::Hasher;
 
-use super::{Material, ObjectShape, Scene, SceneObject};
+use super::{ObjectShape, Scene, SceneObject};
 use crate::surface::{BaseMesh, DisplacedSurface, DisplacementMap};
 
 impl Scene {
@@ -28,9 +28,6 @@ impl Scene {
             digest.object(object);
         }
         digest.debug(materials);
-        for map in materials.iter().flat_map(Material::maps) {
-            digest.map(map);
-        }
         digest.debug(integrator);
         digest.debug(lights);
         format!("{:032x}", digest.0.finish_128())

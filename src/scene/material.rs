@@ -1,20 +1,19 @@
 //! Materials: a subset of the principled material, each parameter a value or a texture.
 
-use std::fmt;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use crate::image::ColorImage;
-use crate::surface::{DisplacementMap, SurfacePoint, UvTransform, Wrap};
+use crate::image::{ColorImage, ScalarImage};
+use crate::surface::{SurfacePoint, UvTransform, Wrap};
 
 /// A colour texture, linear RGB in memory.
 #[derive(Clone, Debug)]
 pub struct Texture {
     /// The picture.
     pub image: Arc<ColorImage>,
-    /// Outside [0, 1].
-    pub wrap: Wrap,
+    /// Outside [0, 1], across and up.
+    pub wrap: [Wrap; 2],
     /// Applied to the mesh's texture coordinates.
     pub uv: UvTransform,
     /// How the picture is laid on the surface.
@@ -96,25 +95,14 @@ pub enum Scalar {
 }
 
 /// One channel of a picture, linear: 0 .. 1 for integer pictures, as stored for float ones.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct ScalarTexture {
-    /// The channel, with its wrap mode.
-    pub map: Arc<DisplacementMap>,
+    /// The channel, with its wrap modes.
+    pub image: Arc<ScalarImage>,
     /// Applied to the mesh's texture coordinates.
     pub uv: UvTransform,
     /// Multiplies.
     pub factor: f32,
-}
-
-impl fmt::Debug for ScalarTexture {
-    /// The map as its size: texels would fill the screen.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("ScalarTexture")
-            .field("size", &self.map.size())
-            .field("uv", &self.uv)
-            .field("factor", &self.factor)
-            .finish()
-    }
 }
 
 impl Scalar {
@@ -122,7 +110,7 @@ impl Scalar {
     pub fn at(&self, point: &SurfacePoint) -> f32 {
         match self {
             Self::Constant(x) => *x,
-            Self::Texture(t) => t.factor * t.map.height(t.uv.apply(point.texcoord)),
+            Self::Texture(t) => t.factor * t.image.sample(t.uv.apply(point.texcoord)),
         }
     }
 
@@ -236,22 +224,19 @@ impl Material {
             let image = &texture.image;
             (Arc::as_ptr(image) as usize, image.bytes())
         };
+        let scalar = |texture: &ScalarTexture| {
+            let image = &texture.image;
+            (Arc::as_ptr(image) as usize, image.bytes())
+        };
         let colors = [&self.base_color, &self.sheen_color, &self.emission];
         let colors = colors.into_iter().filter_map(|c| match c {
             Color::Texture(texture) => Some(color(texture)),
             Color::Constant(_) => None,
         });
-        let detail = self.detail.iter().filter_map(|detail| match detail {
-            Detail::NormalMap { texture, .. } => Some(color(texture)),
-            Detail::Bump(_) => None,
+        let detail = self.detail.iter().map(|detail| match detail {
+            Detail::NormalMap { texture, .. } => color(texture),
+            Detail::Bump(heights) => scalar(heights),
         });
-        let maps = self.maps().into_iter();
-        let maps = maps.map(|map| (Arc::as_ptr(map) as usize, map.bytes()));
-        colors.chain(detail).chain(maps).collect()
-    }
-
-    /// The channels of pictures that its numbers and its bump are read from.
-    pub fn maps(&self) -> Vec<&Arc<DisplacementMap>> {
         let scalars = [
             &self.metallic,
             &self.roughness,
@@ -263,14 +248,10 @@ impl Material {
             &self.opacity,
         ];
         let scalars = scalars.into_iter().filter_map(|s| match s {
-            Scalar::Texture(texture) => Some(&texture.map),
+            Scalar::Texture(texture) => Some(scalar(texture)),
             Scalar::Constant(_) => None,
         });
-        let bump = self.detail.iter().filter_map(|detail| match detail {
-            Detail::Bump(heights) => Some(&heights.map),
-            Detail::NormalMap { .. } => None,
-        });
-        scalars.chain(bump).collect()
+        colors.chain(detail).chain(scalars).collect()
     }
 
     /// Whether it is a source of light.

@@ -1,4 +1,4 @@
-//! Heights on a texel grid, and bilinear samples of them: what a map is, and each level of its means.
+//! Numbers on a texel grid, and bilinear samples of them: what a map is, each level of its means, and a picture of one channel.
 
 use glam::DVec2;
 
@@ -14,18 +14,18 @@ pub struct HeightSample {
     pub gradient: DVec2,
 }
 
-/// Stored heights, of one precision, continued by a wrap mode.
+/// Stored heights, of one precision, continued by a wrap mode along each axis.
 #[derive(Debug)]
-pub(super) struct HeightGrid {
+pub(crate) struct HeightGrid {
     pub width: usize,
     pub height: usize,
-    pub wrap: Wrap,
+    pub wrap: [Wrap; 2],
     pub texels: StoredTexels,
 }
 
 impl HeightGrid {
     /// Of width * height texels.
-    pub fn new(width: usize, height: usize, texels: Texels, wrap: Wrap) -> Self {
+    pub fn new(width: usize, height: usize, texels: Texels, wrap: [Wrap; 2]) -> Self {
         Self {
             width,
             height,
@@ -42,8 +42,8 @@ impl HeightGrid {
     /// Height and in-cell gradient at texel coordinates.
     #[inline(always)]
     pub fn sample(&self, p: DVec2) -> HeightSample {
-        let (i, fx, sx) = self.cell(p.x, self.width);
-        let (j, fy, sy) = self.cell(p.y, self.height);
+        let (i, fx, sx) = cell(p.x, self.width, self.wrap[0]);
+        let (j, fy, sy) = cell(p.y, self.height, self.wrap[1]);
         let stride = self.stride();
         let [h00, h10, h01, h11] = self.texels.cell(j * stride + i, stride);
         let (h00, h10) = (f64::from(h00), f64::from(h10));
@@ -69,8 +69,8 @@ impl HeightGrid {
 
     /// The same, and where `rect` is at an edge that is stored twice, its copies.
     fn write_rows<T: Texel>(&self, to: &[T::Atomic], from: &[T], rect: TexelRect) {
-        let copied_column = repeated(self.wrap, self.width).checked_sub(rect.x);
-        let copied_row = repeated(self.wrap, self.height);
+        let copied_column = repeated(self.wrap[0], self.width).checked_sub(rect.x);
+        let copied_row = repeated(self.wrap[1], self.height);
         let write_row = |j: usize, from: &[T]| {
             let row = &to[j * self.stride()..(j + 1) * self.stride()];
             for (&h, to) in from.iter().zip(&row[rect.x..]) {
@@ -101,17 +101,22 @@ impl HeightGrid {
         }
     }
 
-    /// The cell of coordinate `x` along a side of `n` texels, the position in it, and how fast it moves with x.
-    #[inline(always)]
-    fn cell(&self, x: f64, n: usize) -> (usize, f64, f64) {
-        if x >= 0.0 && x < n as f64 - 1.0 {
-            let cell = x.floor();
-            return (whole(cell), x - cell, 1.0);
-        }
-        let (folded, slope) = self.wrap.fold(x, n as f64);
-        let i = whole(folded.floor()).min(n - 1);
-        (i, folded - i as f64, slope)
+    /// Texture coordinates in [0, 1] to texel coordinates.
+    pub fn to_texel(&self, st: DVec2) -> DVec2 {
+        st * DVec2::new(self.width as f64, self.height as f64) - 0.5
     }
+}
+
+/// The cell of coordinate `x` along a side of `n` texels, the position in it, and how fast it moves with x.
+#[inline(always)]
+fn cell(x: f64, n: usize, wrap: Wrap) -> (usize, f64, f64) {
+    if x >= 0.0 && x < n as f64 - 1.0 {
+        let cell = x.floor();
+        return (whole(cell), x - cell, 1.0);
+    }
+    let (folded, slope) = wrap.fold(x, n as f64);
+    let i = whole(folded.floor()).min(n - 1);
+    (i, folded - i as f64, slope)
 }
 
 /// A whole number from 0 to 2^32 - 1: the low bits of its sum with 2^52, without the checks of `as`.

@@ -122,8 +122,12 @@ impl DisplacementMap {
         Ok(())
     }
 
-    /// A map of `width` x `height` texels, bottom row first.
-    pub fn new(width: usize, height: usize, texels: Texels, wrap: Wrap) -> Result<Self, MapError> {
+    /// Whether texels may be those of a map.
+    pub(crate) fn check_texels(
+        width: usize,
+        height: usize,
+        texels: &Texels,
+    ) -> Result<(), MapError> {
         Self::check_size(width, height)?;
         if texels.len() != width * height {
             return Err(MapError::WrongLength {
@@ -139,9 +143,15 @@ impl DisplacementMap {
                 value,
             });
         }
+        Ok(())
+    }
+
+    /// A map of `width` x `height` texels, bottom row first.
+    pub fn new(width: usize, height: usize, texels: Texels, wrap: Wrap) -> Result<Self, MapError> {
+        Self::check_texels(width, height, &texels)?;
         Ok(Self {
             pyramid: Pyramid::new(&texels, width, height, wrap),
-            grid: HeightGrid::new(width, height, texels, wrap),
+            grid: HeightGrid::new(width, height, texels, [wrap; 2]),
             means: OnceLock::new(),
             editing: Mutex::new(()),
         })
@@ -154,7 +164,8 @@ impl DisplacementMap {
 
     /// The wrap mode.
     pub fn wrap(&self) -> Wrap {
-        self.grid.wrap
+        // Both are the same.
+        self.grid.wrap[0]
     }
 
     /// Smallest and largest height.
@@ -200,7 +211,7 @@ impl DisplacementMap {
 
     /// Texture coordinates in [0, 1] to texel coordinates.
     pub fn to_texel(&self, st: DVec2) -> DVec2 {
-        st * DVec2::new(self.grid.width as f64, self.grid.height as f64) - 0.5
+        self.grid.to_texel(st)
     }
 
     /// Height and in-cell gradient at texel coordinates.

@@ -111,6 +111,38 @@ pub struct MeshBuilder {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// What a transform does to normals: its inverse transpose, signed so that outside stays outside where it mirrors.
+pub(crate) struct NormalTransform {
+    cofactors: [DVec3; 3],
+    mirrors: bool,
+}
+
+impl NormalTransform {
+    pub fn new(transform: &Affine3A) -> Self {
+        let matrix = &transform.matrix3;
+        let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+        let [x, y, z] = axes.map(|axis| Vec3::from(axis).as_dvec3());
+        let mirrors = x.cross(y).dot(z) < 0.0;
+        // The cofactor matrix is det * inverse transpose, and exists where the inverse does not.
+        let sign = if mirrors { -1.0 } else { 1.0 };
+        Self {
+            cofactors: [y.cross(z), z.cross(x), x.cross(y)].map(|c| sign * c),
+            mirrors,
+        }
+    }
+
+    /// Whether the winding of triangles turns round.
+    pub fn mirrors(&self) -> bool {
+        self.mirrors
+    }
+
+    /// The transformed normal, of unit length, or zero.
+    pub fn apply(&self, normal: Vec3) -> Vec3 {
+        let [x, y, z] = self.cofactors;
+        normals::unit(x * f64::from(normal.x) + y * f64::from(normal.y) + z * f64::from(normal.z))
+    }
+}
+
 /// A validated triangle mesh: every index in range, every number finite, every normal of unit length,
 /// every face with an area.
 #[derive(Clone, Debug)]
@@ -167,25 +199,11 @@ impl MeshBuilder {
         for p in &mut self.positions {
             *p = transform.transform_point3(*p);
         }
-        let [x, y, z] = [
-            transform.matrix3.x_axis,
-            transform.matrix3.y_axis,
-            transform.matrix3.z_axis,
-        ]
-        .map(|axis| glam::Vec3::from(axis).as_dvec3());
-        let mirrored = x.cross(y).dot(z) < 0.0;
-        // The cofactor matrix is det * inverse transpose, and exists where the inverse does not.
-        let sign = if mirrored { -1.0 } else { 1.0 };
-        let cofactors = [y.cross(z), z.cross(x), x.cross(y)].map(|c| sign * c);
-        for n in &mut self.normals {
-            let n_world = cofactors[0] * f64::from(n.x)
-                + cofactors[1] * f64::from(n.y)
-                + cofactors[2] * f64::from(n.z);
-            if n.is_finite() {
-                *n = normals::unit(n_world);
-            }
+        let normals = NormalTransform::new(transform);
+        for n in self.normals.iter_mut().filter(|n| n.is_finite()) {
+            *n = normals.apply(*n);
         }
-        if mirrored {
+        if normals.mirrors() {
             for t in &mut self.triangles {
                 t.swap(1, 2);
             }

@@ -33,10 +33,12 @@ mod uv;
 pub use closest::{ClosestPoint, PointQuery};
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
 pub use edit::{TexelRect, Update};
+pub(crate) use grid::HeightGrid;
 pub use grid::HeightSample;
 pub use interpolate::{InterpolateError, Interpolated};
 pub use join::Joined;
 pub use map::{DisplacementMap, MapError};
+pub(crate) use mesh::NormalTransform;
 #[cfg(feature = "embree")] // for the C library
 pub(crate) use mesh::has_area;
 pub use mesh::{BaseMesh, MeshBuilder, MeshError, MeshReport, NormalMode};

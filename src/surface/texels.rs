@@ -156,8 +156,8 @@ impl Texel for f32 {
     }
 }
 
-/// The texels of a map of width x height: (width + 1) x (height + 1) of them, one more column and row as the wrap mode
-/// continues them, so that the four corners of every cell lie at fixed offsets; then [`Self::TAIL`] more, so that a
+/// The texels of a map of width x height: (width + 1) x (height + 1) of them, one more column and row as the wrap modes
+/// continue them, so that the four corners of every cell lie at fixed offsets; then [`Self::TAIL`] more, so that a
 /// 32-bit gather of the last 8-bit texel stays inside.
 #[derive(Debug)]
 pub(crate) enum StoredTexels {
@@ -172,7 +172,7 @@ impl StoredTexels {
     const TAIL: usize = 4;
 
     /// Stores `texels`, width * height of them.
-    pub fn new(texels: Texels, width: usize, height: usize, wrap: Wrap) -> Self {
+    pub fn new(texels: Texels, width: usize, height: usize, wrap: [Wrap; 2]) -> Self {
         match texels {
             Texels::U8(t) => Self::U8(padded(&t, 0, width, height, wrap)),
             Texels::U16(t) => Self::U16(padded(&t, 0, width, height, wrap)),
@@ -267,12 +267,18 @@ pub(super) fn repeated(wrap: Wrap, n: usize) -> usize {
     if wrap == Wrap::Repeat { 0 } else { n - 1 }
 }
 
-fn padded<T: Texel>(t: &[T], zero: T, width: usize, height: usize, wrap: Wrap) -> Box<[T::Atomic]> {
+fn padded<T: Texel>(
+    t: &[T],
+    zero: T,
+    width: usize,
+    height: usize,
+    [across, up]: [Wrap; 2],
+) -> Box<[T::Atomic]> {
     let mut out = Vec::with_capacity((width + 1) * (height + 1) + StoredTexels::TAIL);
-    for j in (0..height).chain([repeated(wrap, height)]) {
+    for j in (0..height).chain([repeated(up, height)]) {
         let row = &t[j * width..(j + 1) * width];
         out.extend(row.iter().map(|h| h.into_atomic()));
-        out.push(row[repeated(wrap, width)].into_atomic());
+        out.push(row[repeated(across, width)].into_atomic());
     }
     out.extend((0..StoredTexels::TAIL).map(|_| zero.into_atomic()));
     out.into_boxed_slice()

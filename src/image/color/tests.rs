@@ -17,7 +17,7 @@ fn two_by_two() -> ColorImage {
 }
 
 fn red(image: &ColorImage, s: f32, t: f32, wrap: Wrap) -> f32 {
-    image.sample(Vec2::new(s, t), wrap).x
+    image.sample(Vec2::new(s, t), [wrap; 2]).x
 }
 
 #[test]
@@ -48,6 +48,15 @@ fn outside_the_wrap_mode_decides() {
 }
 
 #[test]
+fn each_axis_goes_on_by_its_own_mode() {
+    let image = two_by_two();
+    let at = |wrap| image.sample(Vec2::new(1.25, 1.25), wrap).x;
+    assert_eq!(at([Wrap::Repeat, Wrap::Clamp]), 3.0);
+    assert_eq!(at([Wrap::Clamp, Wrap::Repeat]), 2.0);
+    assert_eq!(at([Wrap::Repeat, Wrap::Mirror]), 3.0);
+}
+
+#[test]
 fn any_coordinate_can_be_sampled() {
     for wrap in WRAPS {
         for odd in [
@@ -71,7 +80,7 @@ fn eight_bit_srgb_stays_encoded_and_is_mixed_in_linear_light() {
     let path = folder.picture(ImageFormat::Png, picture);
     let image = load_color(&path, ColorSpace::Srgb).unwrap();
     assert!(matches!(image.pixels, ColorPixels::Srgb8(_)));
-    let middle = image.sample(Vec2::new(0.5, 0.5), Wrap::Clamp);
+    let middle = image.sample(Vec2::new(0.5, 0.5), [Wrap::Clamp; 2]);
     assert!((middle.x - 0.5).abs() < 1e-6);
     assert!((middle.y - 0.5 * srgb_decode(188.0 / 255.0)).abs() < 1e-6);
     let image = load_color(&path, ColorSpace::Linear).unwrap();

@@ -7,7 +7,8 @@ use glam::Vec3;
 
 use super::MapFile;
 use crate::image::{
-    self, Channel, ColorImage, ColorPixels, ColorSpace, EnvironmentImage, ImageError, Source,
+    self, Channel, ColorImage, ColorPixels, ColorSpace, EnvironmentImage, ImageError, ScalarImage,
+    Source,
 };
 use crate::scene::error::AssetError;
 use crate::scene::load::FileTexture;
@@ -29,7 +30,7 @@ pub(super) enum Picture<'a> {
 type PictureKey = (PathBuf, Option<String>);
 
 /// A channel of a picture, and how it goes on outside.
-type ChannelKey = (PictureKey, Channel, Wrap);
+type ChannelKey = (PictureKey, Channel, [Wrap; 2]);
 
 /// A displacement map, and the height of texels without data.
 type HeightsKey = (PathBuf, Channel, Wrap, Option<f32>);
@@ -38,7 +39,7 @@ type HeightsKey = (PathBuf, Channel, Wrap, Option<f32>);
 #[derive(Default)]
 pub(super) struct Assets {
     heights: Vec<(HeightsKey, Arc<DisplacementMap>)>,
-    scalars: Vec<(ChannelKey, Arc<DisplacementMap>)>,
+    scalars: Vec<(ChannelKey, Arc<ScalarImage>)>,
     colors: Vec<((PictureKey, ColorSpace, Vec3), Arc<ColorImage>)>,
     environments: Vec<(PathBuf, Arc<EnvironmentImage>)>,
     stand_in: Option<Arc<ColorImage>>,
@@ -101,15 +102,12 @@ impl Assets {
         &mut self,
         picture: Picture,
         channel: &Channel,
-        wrap: Wrap,
-    ) -> Result<Arc<DisplacementMap>, AssetError> {
+        wrap: [Wrap; 2],
+    ) -> Result<Arc<ScalarImage>, AssetError> {
         once(
             &mut self.scalars,
             (picture.key(), channel.clone(), wrap),
-            || {
-                image::load_heights(picture.source(), channel, wrap, None)
-                    .map_err(|e| picture.refused(e))
-            },
+            || image::load_scalar(picture.source(), channel, wrap).map_err(|e| picture.refused(e)),
         )
     }
 

@@ -86,7 +86,7 @@ impl Builder {
             self.assets
                 .scalar(Picture::File(&table.file.value), &table.channel, table.wrap);
         Ok(ScalarTexture {
-            map: loaded.map_err(|e| table.file.asset(e))?,
+            image: loaded.map_err(|e| table.file.asset(e))?,
             uv: table.uv,
             factor: table.factor,
         })
@@ -168,8 +168,8 @@ impl OfFile<'_> {
         let picture = Picture::of(self.path, &texture.source);
         let assets = &mut self.builder.assets;
         match assets.scalar(picture, &channel, texture.wrap) {
-            Ok(map) => Scalar::Texture(ScalarTexture {
-                map,
+            Ok(image) => Scalar::Texture(ScalarTexture {
+                image,
                 uv: texture.uv,
                 factor: scalar.factor,
             }),

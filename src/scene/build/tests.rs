@@ -228,7 +228,7 @@ fn all_parameters_of_a_material_arrive() {
     else {
         panic!("textures were written");
     };
-    assert!(Arc::ptr_eq(&roughness.map, &opacity.map));
+    assert!(Arc::ptr_eq(&roughness.image, &opacity.image));
     assert_eq!((roughness.factor, opacity.factor), (0.5, 1.0));
     assert!(matches!(&material.detail, Some(Detail::Bump(b)) if b.factor == 0.25));
     // Scalars are no displacement maps, and an emissive scene needs no sun.
@@ -495,4 +495,173 @@ fn a_bump_map_of_a_mesh_file_shades_where_it_does_not_displace() {
         error.contains("map_Bump of material \"rough\" in two.mtl"),
         "{error}"
     );
+}
+
+/// A square of a metre with a texture 2 x 2 that its coordinates, from 0 to 1.5, go beyond.
+fn wrapped(folder: &TempDir, wrap: [u32; 2], node: &str) {
+    let floats = |numbers: &[f32]| -> String {
+        let bytes = numbers.iter().flat_map(|n| n.to_le_bytes());
+        bytes.map(|b| format!("%{b:02x}")).collect()
+    };
+    let data = floats(&[
+        0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, // positions
+        0.0, 0.0, 1.5, 0.0, 0.0, 1.5, // texture coordinates
+        0.0, 0.0, 0.0, 4.0, 0.0, 0.0, // instances
+    ]);
+    let [s, t] = wrap;
+    let document = format!(
+        r#"{{ "asset": {{ "version": "2.0" }}, "scenes": [{{ "nodes": [0] }}], "nodes": [{{ "mesh": 0{node} }}],
+        "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0, "TEXCOORD_0": 1 }}, "material": 0 }}] }}],
+        "materials": [{{ "normalTexture": {{ "index": 0 }}, "pbrMetallicRoughness": {{
+            "baseColorTexture": {{ "index": 0 }}, "metallicRoughnessTexture": {{ "index": 0 }} }} }}],
+        "textures": [{{ "source": 0, "sampler": 0 }}], "samplers": [{{ "wrapS": {s}, "wrapT": {t} }}],
+        "images": [{{ "uri": "four.png" }}],
+        "accessors": [
+            {{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" }},
+            {{ "bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2" }},
+            {{ "bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3" }} ],
+        "bufferViews": [
+            {{ "buffer": 0, "byteLength": 36 }},
+            {{ "buffer": 0, "byteOffset": 36, "byteLength": 24 }},
+            {{ "buffer": 0, "byteOffset": 60, "byteLength": 24 }} ],
+        "buffers": [{{ "byteLength": 84, "uri": "data:,{data}" }}] }}"#
+    );
+    fs::write(folder.path().join("m.gltf"), document).unwrap();
+    let pixels = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
+    write_png_rgb8(&folder.path().join("four.png"), 2, 2, &pixels, &[]).unwrap();
+}
+
+#[test]
+fn wrap_modes_of_both_axes_reach_every_pixel() {
+    const REPEAT: u32 = 10_497;
+    const CLAMP: u32 = 33_071;
+    let folder = folder();
+    // Right of the picture and below it, glTF's v down: what repeats starts again, what is clamped stays at the edge.
+    let texcoord = glam::Vec2::new(1.25, 1.0 - 1.25);
+    let point = crate::surface::SurfacePoint {
+        position: Vec3::ZERO,
+        base_position: Vec3::ZERO,
+        base_normal: Vec3::Z,
+        geometric_normal: Vec3::Z,
+        shading_normal: Vec3::Z,
+        texcoord,
+        tolerance: 0.0,
+        displacement: 0.0,
+    };
+    for (wrap, expected) in [
+        ([REPEAT, REPEAT], Vec3::Z),
+        ([REPEAT, CLAMP], Vec3::X),
+        ([CLAMP, REPEAT], Vec3::ONE),
+        ([CLAMP, CLAMP], Vec3::Y),
+    ] {
+        wrapped(&folder, wrap, "");
+        let loaded = load(&folder, "[[mesh]]\nfile = \"m.gltf\"\n").unwrap();
+        let material = &loaded.scene.materials[0];
+        assert_eq!(material.base_color.at(&point), expected);
+        // Green and blue.
+        assert_eq!(material.roughness.at(&point), expected.y);
+        assert_eq!(material.metallic.at(&point), expected.z);
+        let Some(Detail::NormalMap { texture, .. }) = &material.detail else {
+            panic!("a normal map was written");
+        };
+        assert_eq!(texture.sample(&point), expected);
+    }
+    // The same by a scene's own textures.
+    let scene = "[[mesh]]\nfile = \"two.obj\"\nmaterial = \"m\"\n[[material]]\nname = \"m\"\nbase_color = { file = \"four.png\", wrap = [\"repeat\", \"clamp\"] }\nroughness = { file = \"four.png\", channel = \"r\", wrap = [\"repeat\", \"clamp\"] }\nmetallic = { file = \"four.png\", channel = \"g\", wrap = \"clamp\" }\n";
+    let loaded = load(&folder, scene).unwrap();
+    let material = &loaded.scene.materials[0];
+    assert_eq!(material.base_color.at(&point), Vec3::X);
+    assert_eq!(material.roughness.at(&point), 1.0);
+    assert_eq!(material.metallic.at(&point), 1.0);
+    for (key, table) in [
+        ("wrap = [\"repeat\", \"clamp\"]", "displacement"),
+        ("wrap = [\"repeat\"]", "base_color"),
+        ("wrap = [\"repeat\", \"tile\"]", "base_color"),
+    ] {
+        let scene = match table {
+            "displacement" => {
+                format!("[[mesh]]\nfile = \"two.obj\"\n[mesh.displacement]\nscale = 1\n{key}\n")
+            }
+            _ => format!(
+                "[[mesh]]\nfile = \"two.obj\"\n[[material]]\nname = \"m\"\nbase_color = {{ file = \"four.png\", {key} }}\n"
+            ),
+        };
+        let error = load(&folder, &scene).unwrap_err().to_string();
+        assert!(error.contains(&format!("{table}.wrap")), "{error}");
+    }
+}
+
+#[test]
+fn instances_of_a_mesh_file_are_placed_by_those_of_the_scene() {
+    let folder = folder();
+    let instancing =
+        r#", "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": 2 } } }"#;
+    wrapped(&folder, [10_497; 2], instancing);
+    let scene = |keys: &str| {
+        let text = format!(
+            "[[mesh]]\nfile = \"m.gltf\"\n{keys}\n[mesh.displacement]\nmap = \"height.png\"\nscale = 0.5\n"
+        );
+        load(&folder, &text).unwrap().scene
+    };
+    let corners = |scene: &Scene| -> Vec<Vec3> {
+        let object = &scene.objects[0];
+        let corner = surface(object).mesh().positions()[1];
+        let instances = object.instances.iter();
+        instances.map(|t| t.transform_point3(corner)).collect()
+    };
+    let plain = scene("");
+    assert_eq!(plain.objects.len(), 1);
+    assert_eq!(corners(&plain), [Vec3::X, 5.0 * Vec3::X]);
+    // The transform scales what the file places, distances too; the displacement stays in world units.
+    let scaled = scene("transform = { scale = 2, translate = [0, 0, 1] }");
+    assert_eq!(
+        corners(&scaled),
+        [Vec3::new(2.0, 0.0, 1.0), Vec3::new(10.0, 0.0, 1.0)]
+    );
+    assert_eq!(surface(&scaled.objects[0]).range(), (0.0, 0.5));
+    let twice = scene("instances = [ {}, { translate = [0, 7, 0] } ]");
+    let up = Vec3::new(0.0, 7.0, 0.0);
+    assert_eq!(
+        corners(&twice),
+        [Vec3::X, 5.0 * Vec3::X, Vec3::X + up, 5.0 * Vec3::X + up]
+    );
+    // On the command line, too.
+    let loaded = Loaded::from_mesh_and_map(&MeshAndMap {
+        mesh: folder.path().join("m.gltf"),
+        texcoords: None,
+        map: folder.path().join("height.png"),
+        channel: Channel::default(),
+        wrap: Wrap::Repeat,
+        nodata: None,
+        displacement: Displacement {
+            scale: 0.5,
+            midlevel: 0.0,
+            uv: Default::default(),
+        },
+        prisms: PrismOptions::default(),
+        options: LoadOptions::default(),
+    });
+    assert_eq!(corners(&loaded.unwrap().scene), [Vec3::X, 5.0 * Vec3::X]);
+}
+
+#[test]
+fn materials_without_a_name_stay_apart() {
+    let folder = folder();
+    wrapped(&folder, [10_497; 2], "");
+    let text = fs::read_to_string(folder.path().join("m.gltf")).unwrap();
+    let text = text
+        .replace(
+            "\"materials\": [",
+            "\"materials\": [{ \"pbrMetallicRoughness\": { \"metallicFactor\": 0.25 } }, ",
+        )
+        .replace(
+            "\"material\": 0 }]",
+            "\"material\": 0 }, { \"attributes\": { \"POSITION\": 0 }, \"material\": 1 }]",
+        );
+    fs::write(folder.path().join("m.gltf"), text).unwrap();
+    let scene = load(&folder, "[[mesh]]\nfile = \"m.gltf\"\n")
+        .unwrap()
+        .scene;
+    let metallic = |object: usize| &scene.materials[scene.objects[object].material].metallic;
+    assert!(metallic(0).is(0.25) && !metallic(1).is(0.25));
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::{Item, Keyed, SceneError, Section, channel, file_path, keyed, uv_transform, wrap};
+use super::{Item, Keyed, SceneError, Section, channel, file_path, keyed, uv_transform, wraps};
 use crate::image::{Channel, ColorSpace};
 use crate::scene::{Coordinates, Material};
 use crate::surface::{UvTransform, Wrap};
@@ -42,7 +42,7 @@ pub(in crate::scene) enum ColorTable {
 pub(in crate::scene) struct TextureTable {
     pub file: Keyed<PathBuf>,
     pub color_space: ColorSpace,
-    pub wrap: Wrap,
+    pub wrap: [Wrap; 2],
     pub uv: UvTransform,
     pub coordinates: Coordinates,
 }
@@ -59,7 +59,7 @@ pub(in crate::scene) enum ScalarTable {
 pub(in crate::scene) struct ScalarTextureTable {
     pub file: Keyed<PathBuf>,
     pub channel: Channel,
-    pub wrap: Wrap,
+    pub wrap: [Wrap; 2],
     pub uv: UvTransform,
     pub factor: f32,
 }
@@ -199,7 +199,7 @@ fn texture(mut section: Section, folder: &Path) -> Result<TextureTable, SceneErr
         color_space: section
             .optional("color_space", |i| i.word(&spaces))?
             .unwrap_or(ColorSpace::Srgb),
-        wrap: section.optional("wrap", wrap)?.unwrap_or_default(),
+        wrap: section.optional("wrap", wraps)?.unwrap_or_default(),
         uv: section.optional("uv", uv_transform)?.unwrap_or_default(),
         coordinates: coordinates(&mut section)?,
     })
@@ -247,7 +247,7 @@ fn scalar_texture(
     Ok(ScalarTextureTable {
         file: file_path(&file, folder)?,
         channel: section.optional("channel", channel)?.unwrap_or_default(),
-        wrap: section.optional("wrap", wrap)?.unwrap_or_default(),
+        wrap: section.optional("wrap", wraps)?.unwrap_or_default(),
         uv: section.optional("uv", uv_transform)?.unwrap_or_default(),
         factor,
     })

@@ -142,7 +142,7 @@ impl DisplacementTable {
             channel: section.optional("channel", channel)?,
             scale: section.optional("scale", |i| i.number(SCALE, |x| x != 0.0))?,
             midlevel: section.optional("midlevel", |i| i.number("a height", |_| true))?,
-            wrap: section.optional("wrap", wrap)?,
+            wrap: section.optional("wrap", one_wrap)?,
             nodata: section.optional("nodata", |i| i.number("a height", |_| true))?,
             uv: section.optional("uv", uv_transform)?,
             prisms: PrismOptions {
@@ -153,6 +153,15 @@ impl DisplacementTable {
             seams: seams(&mut section, march)?,
         })
     }
+}
+
+/// A map is displaced by one mode in both directions.
+fn one_wrap(item: Item) -> Result<Wrap, SceneError> {
+    if item.is_array() {
+        let expected = "one word for both directions; only textures that shade have two";
+        return Err(item.refuse(expected));
+    }
+    wrap(item)
 }
 
 fn seams(section: &mut super::Section, march: March) -> Result<Option<Seams>, SceneError> {

@@ -168,6 +168,18 @@ fn wrap(item: Item) -> Result<crate::surface::Wrap, SceneError> {
     ])
 }
 
+/// The same word for both axes, or one across and one up.
+fn wraps(item: Item) -> Result<[crate::surface::Wrap; 2], SceneError> {
+    if !item.is_array() {
+        return Ok([wrap(item)?; 2]);
+    }
+    let expected = "a word, or two for across and up, like [\"repeat\", \"clamp\"]";
+    let wrong = item.refuse(expected);
+    let words: Vec<_> = item.items(expected)?;
+    let words = words.into_iter().map(wrap).collect::<Result<Vec<_>, _>>()?;
+    words.try_into().map_err(|_| wrong)
+}
+
 /// `{ scale, rotate, offset }`, all optional.
 fn uv_transform(item: Item) -> Result<crate::surface::UvTransform, SceneError> {
     let mut section = item.section(&["scale", "rotate", "offset"])?;

@@ -7,11 +7,9 @@ use std::collections::BTreeMap;
 use std::panic::catch_unwind;
 
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute};
-use glam::{Vec2, Vec3};
 use serde::Deserialize;
 
-/// The extension's name.
-pub(super) const EXTENSION: &str = "KHR_draco_mesh_compression";
+use super::gltf::Kind;
 
 /// Most vertices or triangles per byte of a stream. Regular grids need a few hundredths of a bit each.
 const COUNT_PER_BYTE: usize = 4096;
@@ -36,26 +34,19 @@ pub(super) struct Announced {
     pub triangles: usize,
 }
 
-/// A stream unpacked: per-vertex arrays of one length, or empty; indices are not checked against it.
+/// A stream unpacked; indices are not checked against its vertices.
 #[derive(Debug)]
-pub(super) struct Decoded {
-    pub positions: Vec<Vec3>,
-    pub normals: Vec<Vec3>,
-    /// As stored, so v points down.
-    pub texcoords: Vec<Vec2>,
-    pub triangles: Vec<[u32; 3]>,
+pub(super) struct Unpacked {
+    mesh: Mesh,
+    triangles: Vec<[u32; 3]>,
 }
 
-/// Unpacks a stream. Normals and texture coordinates are taken if `attributes` names `NORMAL`, `TEXCOORD_0`.
+/// Unpacks a stream.
 ///
 /// # Errors
 ///
-/// A sentence for the user, if the stream is damaged, larger than announced or lacks an attribute.
-pub(super) fn decode(
-    stream: &[u8],
-    attributes: &BTreeMap<String, u32>,
-    announced: Announced,
-) -> Result<Decoded, String> {
+/// A sentence for the user, if the stream is damaged or larger than announced.
+pub(super) fn decode(stream: &[u8], announced: Announced) -> Result<Unpacked, String> {
     let limits = limits(stream.len(), announced)?;
     // The crate means never to panic; that is too much to rely on for every damaged stream.
     let mesh = catch_unwind(|| {
@@ -66,18 +57,63 @@ pub(super) fn decode(
     })
     .map_err(|_| "the decoder stumbled over it; is it damaged?".to_owned())?
     .map_err(|e| e.to_string())?;
-    let float = [DataType::Float32];
-    let fraction = [DataType::Float32, DataType::Uint8, DataType::Uint16];
-    let vec3 = |semantic| -> Result<Option<Vec<Vec3>>, String> {
-        let values = values(&mesh, semantic, attributes, &float)?;
-        Ok(values.map(|v| v.into_iter().map(Vec3::from_array).collect()))
-    };
-    let texcoords = values(&mesh, "TEXCOORD_0", attributes, &fraction)?.unwrap_or_default();
-    Ok(Decoded {
-        positions: vec3("POSITION")?.ok_or("the extension names no POSITION in it")?,
-        normals: vec3("NORMAL")?.unwrap_or_default(),
-        texcoords: texcoords.into_iter().map(Vec2::from_array).collect(),
+    Ok(Unpacked {
         triangles: mesh.faces().iter().map(|f| f.map(|p| p.0)).collect(),
+        mesh,
+    })
+}
+
+impl Unpacked {
+    pub fn vertices(&self) -> usize {
+        self.mesh.num_points()
+    }
+
+    /// The triangles, which are gone then.
+    pub fn take_triangles(&mut self) -> Vec<[u32; 3]> {
+        std::mem::take(&mut self.triangles)
+    }
+
+    /// The values of the attribute that the stream knows by `id`, one per vertex; integers perhaps as fractions of their type's
+    /// largest.
+    ///
+    /// # Errors
+    ///
+    /// A sentence for the user that names `semantic`, if there is no such attribute or it is of another type.
+    pub fn values<const N: usize>(
+        &self,
+        semantic: &str,
+        id: u32,
+        kinds: &[Kind],
+        normalized: bool,
+    ) -> Result<Vec<[f32; N]>, String> {
+        let attribute: &PointAttribute = self
+            .mesh
+            .attribute_by_unique_id(id)
+            .ok_or_else(|| format!("it has no attribute {id}, named as its {semantic}"))?;
+        let (found, components) = (attribute.data_type(), attribute.num_components());
+        let kind = kind(found).filter(|kind| kinds.contains(kind) && usize::from(components) == N);
+        let kind = kind.ok_or_else(|| {
+            let expected: Vec<_> = kinds.iter().map(Kind::to_string).collect();
+            let expected = expected.join(" or ");
+            format!("its {semantic} has {components} components of {found:?}; expected {N} of {expected}")
+        })?;
+        let flat = attribute.read_f32s(self.mesh.num_points(), N);
+        let (values, _) = flat.as_chunks::<N>();
+        let to_float = |x| kind.to_float(x, normalized);
+        Ok(values.iter().map(|v| v.map(to_float)).collect())
+    }
+}
+
+/// The type as glTF has it.
+fn kind(found: DataType) -> Option<Kind> {
+    Some(match found {
+        DataType::Int8 => Kind::I8,
+        DataType::Uint8 => Kind::U8,
+        DataType::Int16 => Kind::I16,
+        DataType::Uint16 => Kind::U16,
+        DataType::Uint32 => Kind::U32,
+        DataType::Float32 => Kind::F32,
+        _ => return None,
     })
 }
 
@@ -108,42 +144,14 @@ fn limits(bytes: usize, announced: Announced) -> Result<DecodeLimits, String> {
         ))
 }
 
-/// The values of an attribute, one per vertex; `None` if `attributes` does not name it. Integers are
-/// fractions of their type's largest.
-fn values<const N: usize>(
-    mesh: &Mesh,
-    semantic: &str,
-    attributes: &BTreeMap<String, u32>,
-    types: &[DataType],
-) -> Result<Option<Vec<[f32; N]>>, String> {
-    let Some(&id) = attributes.get(semantic) else {
-        return Ok(None);
-    };
-    let attribute: &PointAttribute = mesh
-        .attribute_by_unique_id(id)
-        .ok_or_else(|| format!("it has no attribute {id}, named as its {semantic}"))?;
-    let (kind, components) = (attribute.data_type(), attribute.num_components());
-    if !types.contains(&kind) || usize::from(components) != N {
-        return Err(format!(
-            "its {semantic} has {components} components of {kind:?}; expected {N} of {types:?}"
-        ));
-    }
-    let unit = match kind {
-        DataType::Uint8 => 1.0 / f32::from(u8::MAX),
-        DataType::Uint16 => 1.0 / f32::from(u16::MAX),
-        _ => 1.0,
-    };
-    let flat = attribute.read_f32s(mesh.num_points(), N);
-    let (values, _) = flat.as_chunks::<N>();
-    Ok(Some(values.iter().map(|v| v.map(|x| x * unit)).collect()))
-}
-
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::gltf::FLOATS;
     use super::*;
     use draco_core::{
         EncoderBuffer, EncoderOptions, GeometryAttributeType, MeshEncoder, PointIndex,
     };
+    use glam::{Vec2, Vec3};
 
     /// Squares along one side of the test sheet.
     const SIDE: u32 = 6;
@@ -201,26 +209,27 @@ pub(super) mod tests {
         out.data().to_vec()
     }
 
-    fn all() -> BTreeMap<String, u32> {
-        [("POSITION", 0), ("NORMAL", 1), ("TEXCOORD_0", 2)]
-            .map(|(semantic, id)| (semantic.to_owned(), id))
-            .into()
+    fn floats<const N: usize>(unpacked: &Unpacked, id: u32) -> Result<Vec<[f32; N]>, String> {
+        unpacked.values("SHEET", id, FLOATS, false)
     }
 
     #[test]
     fn what_was_encoded_comes_back_at_every_level() {
         for level in 0..=10 {
-            let sheet = decode(&sheet(level), &all(), SHEET).unwrap();
+            let sheet = decode(&sheet(level), SHEET).unwrap();
             assert_eq!(sheet.triangles.len(), SHEET.triangles, "level {level}");
-            assert_eq!(sheet.positions.len(), SHEET.vertices, "level {level}");
+            assert_eq!(sheet.vertices(), SHEET.vertices, "level {level}");
+            let positions = floats::<3>(&sheet, 0).unwrap();
+            let normals = floats::<3>(&sheet, 1).unwrap();
+            let texcoords = floats::<2>(&sheet, 2).unwrap();
             let mut area = 0.0;
             for t in &sheet.triangles {
                 for i in t.map(|i| i as usize) {
-                    let there = place(sheet.texcoords[i].to_array());
-                    assert!((sheet.positions[i] - there).length() < 1e-3);
-                    assert!((sheet.normals[i] - Vec3::Z).length() < 1e-2);
+                    let there = place(texcoords[i]);
+                    assert!((Vec3::from(positions[i]) - there).length() < 1e-3);
+                    assert!((Vec3::from(normals[i]) - Vec3::Z).length() < 1e-2);
                 }
-                let [a, b, c] = t.map(|i| sheet.texcoords[i as usize]);
+                let [a, b, c] = t.map(|i| Vec2::from(texcoords[i as usize]));
                 area += 0.5 * (b - a).perp_dot(c - a);
             }
             // Every square once, none turned over.
@@ -233,7 +242,7 @@ pub(super) mod tests {
         for level in [0, 7] {
             let whole = sheet(level);
             for length in 0..whole.len() {
-                let result = decode(&whole[..length], &all(), SHEET);
+                let result = decode(&whole[..length], SHEET);
                 assert!(
                     result.is_err(),
                     "level {level}: {length} of {}",
@@ -251,9 +260,9 @@ pub(super) mod tests {
                 for flip in [0x01, 0x80, 0xff] {
                     let mut damaged = whole.clone();
                     damaged[position] ^= flip;
-                    if let Ok(mesh) = decode(&damaged, &all(), SHEET) {
+                    if let Ok(mesh) = decode(&damaged, SHEET) {
                         assert!(mesh.triangles.len() <= SHEET.triangles);
-                        assert!(mesh.positions.len() <= 3 * SHEET.triangles);
+                        assert!(mesh.vertices() <= 3 * SHEET.triangles);
                     }
                 }
             }
@@ -267,28 +276,25 @@ pub(super) mod tests {
             triangles: SHEET.triangles - 1,
             ..SHEET
         };
-        assert!(decode(&stream, &all(), fewer).is_err());
+        assert!(decode(&stream, fewer).is_err());
         let absurd = Announced {
             vertices: usize::MAX,
             ..SHEET
         };
-        let error = decode(&stream, &all(), absurd).unwrap_err();
+        let error = decode(&stream, absurd).unwrap_err();
         assert!(error.contains("announce"), "{error}");
     }
 
     #[test]
     fn attributes_are_known_by_id_and_shape() {
-        let stream = sheet(7);
-        let mut named = all();
-        named.remove("NORMAL");
-        assert!(decode(&stream, &named, SHEET).unwrap().normals.is_empty());
-        for (semantic, id) in [("NORMAL", 9), ("NORMAL", 2), ("TEXCOORD_0", 0)] {
-            let mut named = all();
-            named.insert(semantic.into(), id);
-            let error = decode(&stream, &named, SHEET).unwrap_err();
-            assert!(error.contains(semantic), "{error}");
-        }
-        named.remove("POSITION");
-        assert!(decode(&stream, &named, SHEET).is_err());
+        let sheet = decode(&sheet(7), SHEET).unwrap();
+        let refused = |id, kinds| {
+            let error = sheet.values::<3>("NORMAL", id, kinds, false).unwrap_err();
+            assert!(error.contains("NORMAL"), "{error}");
+        };
+        assert!(floats::<3>(&sheet, 1).is_ok());
+        refused(9, FLOATS);
+        refused(2, FLOATS);
+        refused(1, &[Kind::I8]);
     }
 }

@@ -132,8 +132,8 @@ impl FileScalar {
 pub struct FileTextureUse {
     /// The picture.
     pub source: FileTexture,
-    /// Outside [0, 1].
-    pub wrap: Wrap,
+    /// Outside [0, 1], along u and v.
+    pub wrap: [Wrap; 2],
     /// Of texture coordinates with v up.
     pub uv: UvTransform,
     /// What names it, for messages: `map_Kd of material "rock" in rock.mtl`.

@@ -18,7 +18,7 @@ mod text;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use glam::{Vec2, Vec3};
+use glam::{Affine3A, DAffine3, Vec2, Vec3};
 use thiserror::Error;
 
 use crate::files::input;
@@ -99,6 +99,16 @@ pub enum LoadMeshErrorKind {
         /// What is wrong.
         problem: String,
     },
+    /// A glTF file that names a file outside of its folder, without leave.
+    #[error(
+        "{what}: its URI {uri:?} leads out of the file's folder; with --allow-external such files are read"
+    )]
+    External {
+        /// What the file is for.
+        what: String,
+        /// As it is written.
+        uri: String,
+    },
     /// Sound, but beyond this reader.
     #[error("{what} is not supported")]
     Unsupported {
@@ -108,6 +118,13 @@ pub enum LoadMeshErrorKind {
     /// Nothing to trace.
     #[error("the file holds no faces")]
     NoFaces,
+}
+
+/// What a mesh file may do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Whether a glTF file may name buffers and pictures outside of its own folder.
+    pub allow_external: bool,
 }
 
 /// A mesh file as read: not yet validated, nothing computed.
@@ -130,6 +147,8 @@ pub struct Part {
     pub mesh: MeshBuilder,
     /// The file's material, if it gives one.
     pub material: Option<FileMaterial>,
+    /// Empty: stands once as it is. Else where the file places it (EXT_mesh_gpu_instancing), as transforms of the mesh as it is.
+    pub instances: Vec<Affine3A>,
 }
 
 /// Reads a mesh file; the format goes by the ending.
@@ -139,7 +158,16 @@ pub struct Part {
 /// [`LoadMeshError`], which names the file. Numbers that are NaN or infinite are left to
 /// [`MeshBuilder::build`], which names the vertex.
 pub fn load_mesh(path: &Path) -> Result<LoadedFile, LoadMeshError> {
-    read(path).map_err(|kind| LoadMeshError {
+    load_mesh_with(path, LoadOptions::default())
+}
+
+/// The same with leave to do more.
+///
+/// # Errors
+///
+/// As [`load_mesh`].
+pub fn load_mesh_with(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshError> {
+    read(path, options).map_err(|kind| LoadMeshError {
         path: path.to_owned(),
         kind,
     })
@@ -160,7 +188,15 @@ impl LoadedFile {
         }
     }
 
-    /// All parts as one mesh, part after part; the materials are dropped.
+    /// Takes out the parts that the file places itself.
+    pub fn take_placed(&mut self) -> Vec<Part> {
+        let parts = std::mem::take(&mut self.parts).into_iter();
+        let (placed, single) = parts.partition(|part| !part.instances.is_empty());
+        self.parts = single;
+        placed
+    }
+
+    /// All parts as one mesh, part after part; the materials are dropped, and so is where the file places a part.
     pub fn into_single_mesh(self) -> MeshBuilder {
         let mut whole = MeshBuilder::default();
         for part in self.parts {
@@ -170,7 +206,7 @@ impl LoadedFile {
     }
 }
 
-fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+fn read(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshErrorKind> {
     let extension = path
         .extension()
         .map(|e| e.to_string_lossy().to_lowercase())
@@ -188,7 +224,7 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     let mut file = match extension.as_str() {
         "obj" => obj::read(&bytes, path)?,
         "ply" => ply::read(&bytes, path)?,
-        _ => gltf::read(&bytes, path)?,
+        _ => gltf::read(&bytes, path, options)?,
     };
     if file.parts.is_empty() {
         return Err(LoadMeshErrorKind::NoFaces);
@@ -201,28 +237,62 @@ fn read(path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
     Ok(file)
 }
 
-/// Sorts meshes into parts by material and by whether they have texture coordinates.
+/// Transforms of a mesh in its own space as transforms of the mesh as `moved` has it, so that one that stands still is moved as the
+/// mesh is and no more; `None` if `moved` leaves nothing to stand.
+pub(super) fn conjugated(
+    transforms: impl IntoIterator<Item = Affine3A>,
+    moved: &Affine3A,
+) -> Option<Vec<Affine3A>> {
+    let moved = in_double(moved);
+    let back = moved.inverse();
+    back.is_finite().then(|| {
+        let transforms = transforms.into_iter().map(|t| moved * in_double(&t) * back);
+        transforms.map(|t| t.as_affine3a()).collect()
+    })
+}
+
+fn in_double(t: &Affine3A) -> DAffine3 {
+    let [x, y, z] = [t.matrix3.x_axis, t.matrix3.y_axis, t.matrix3.z_axis].map(|c| c.as_dvec3());
+    DAffine3::from_cols(x, y, z, t.translation.as_dvec3())
+}
+
+/// Sorts meshes into parts by material, by whether they have texture coordinates, and by who instances them.
 #[derive(Default)]
 struct Parts {
     parts: Vec<Part>,
     /// Per part, the material's index in the file.
     materials: Vec<Option<usize>>,
-    by_key: HashMap<(Option<usize>, bool), usize>,
+    by_key: HashMap<PartKey, usize>,
 }
 
+/// Material, whether there are no texture coordinates, and the node that instances.
+type PartKey = (Option<usize>, bool, Option<usize>);
+
 impl Parts {
-    /// Adds faces; a mesh without faces is forgotten.
-    fn add(&mut self, name: &str, material: Option<usize>, mesh: MeshBuilder) {
+    /// Adds faces, perhaps those that the node of a number places many times; a mesh without faces is forgotten.
+    fn add(
+        &mut self,
+        name: &str,
+        material: Option<usize>,
+        mesh: MeshBuilder,
+        placed: Option<(usize, &[Affine3A])>,
+    ) {
         if mesh.triangles.is_empty() {
             return;
         }
-        let index = self.open(name, material, !mesh.texcoords.is_empty());
+        let index = self.open(name, material, !mesh.texcoords.is_empty(), placed);
         self.parts[index].mesh.append(mesh);
     }
 
     /// The number of the part for such faces; if it is new, it has none yet.
-    fn open(&mut self, name: &str, material: Option<usize>, textured: bool) -> usize {
-        let key = (material, textured);
+    fn open(
+        &mut self,
+        name: &str,
+        material: Option<usize>,
+        textured: bool,
+        placed: Option<(usize, &[Affine3A])>,
+    ) -> usize {
+        let key = (material, textured, placed.map(|p| p.0));
         let index = *self.by_key.entry(key).or_insert(self.parts.len());
         if index == self.parts.len() {
             self.materials.push(material);
@@ -230,6 +300,7 @@ impl Parts {
                 name: name.to_owned(),
                 mesh: MeshBuilder::default(),
                 material: None,
+                instances: placed.map_or_else(Vec::new, |p| p.1.to_vec()),
             });
         }
         index

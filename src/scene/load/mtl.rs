@@ -212,7 +212,7 @@ impl Maps<'_, '_, '_> {
         let map = &self.said.maps.get(statement)?.map;
         Some(FileTextureUse {
             source: FileTexture::Path(path),
-            wrap: map.wrap.unwrap_or_default(),
+            wrap: [map.wrap.unwrap_or_default(); 2],
             uv: map.uv,
             from,
         })

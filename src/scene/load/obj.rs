@@ -236,7 +236,7 @@ impl<'a> Faces<'a> {
         self.positions.clear();
         self.positions.extend(positions);
         let textured = self.corners[0].vt.is_some();
-        let part = self.parts.open(&self.group, self.material, textured);
+        let part = self.parts.open(&self.group, self.material, textured, None);
         for triangle in self.triangulator.cut(&self.positions) {
             let triangle = triangle.map(|i| {
                 let corner = self.corners[i as usize];

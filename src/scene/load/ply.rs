@@ -180,7 +180,7 @@ fn textured_material(
             factor: Vec3::ONE,
             texture: Some(FileTextureUse {
                 source: FileTexture::Path(located.path),
-                wrap: Wrap::default(),
+                wrap: [Wrap::default(); 2],
                 uv: UvTransform::default(),
                 from,
             }),
@@ -387,7 +387,7 @@ impl Builder {
         let textured = own.is_some() || self.vertices.has_texcoords;
         let texture = usize::try_from(polygon.texture).ok();
         let texture = texture.filter(|&t| textured && t < self.textures);
-        let part = self.parts.open("", texture, textured);
+        let part = self.parts.open("", texture, textured, None);
         for triangle in self.triangulator.cut(positions) {
             let triangle = triangle.map(|i| {
                 let i = i as usize;

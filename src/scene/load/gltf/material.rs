@@ -1,44 +1,173 @@
 //! Materials of glTF 2.0, with the extensions that a principled material can follow: emissive_strength, ior,
 //! transmission, volume, specular, clearcoat, sheen (KHR_materials_*) and KHR_texture_transform.
 //!
-//! Read from the plain JSON: the crate's accessors panic on an image without a source, and know not all extensions.
-//! What is missing or of another type than it should be is as if it were not there; numbers out of range are clamped.
+//! Read from the plain JSON, since extensions add to it. What is missing or of another type than it should be is as if it were not
+//! there; numbers out of range are clamped.
 
-use std::collections::BTreeSet;
-use std::path::Path;
+use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use serde_json::Value;
 
-use super::{Document, base64, percent_decoded, view_bytes};
+use super::buffers::Buffers;
+use super::document::{Document, Image, Texture};
+use super::uri::{Resource, Uris};
+use super::{LoadMeshErrorKind, malformed};
 use crate::scene::load::{
-    FileColor, FileDetail, FileMaterial, FileScalar, FileTexture, FileTextureUse, beside,
+    FileColor, FileDetail, FileMaterial, FileScalar, FileTexture, FileTextureUse,
 };
 use crate::surface::{UvTransform, Wrap};
 
 /// glTF's codes for wrap modes.
-const CLAMP_TO_EDGE: u64 = 33_071;
-const MIRRORED_REPEAT: u64 = 33_648;
+const CLAMP_TO_EDGE: u32 = 33_071;
+const MIRRORED_REPEAT: u32 = 33_648;
 
-/// One material of a document.
+/// The extension that names a picture of a format that is read.
+const WEBP: &str = "EXT_texture_webp";
+
+/// Reads the materials of a document.
 pub(super) struct Reader<'a> {
-    pub document: &'a Document,
-    pub buffers: &'a [Vec<u8>],
-    pub path: &'a Path,
+    document: &'a Document,
+    /// Per texture, its picture, if there is one that is read.
+    textures: Vec<Option<FileTextureUse>>,
+}
+
+impl<'a> Reader<'a> {
+    /// With all pictures looked up; those that are not there are warned of.
+    ///
+    /// # Errors
+    ///
+    /// What buffers and URIs can have wrong with them.
+    pub fn new(
+        document: &'a Document,
+        buffers: &Buffers,
+        uris: Uris,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, LoadMeshErrorKind> {
+        let mut pictures = Pictures::new(document, buffers, uris);
+        let images = (0..document.images.len()).map(|index| pictures.get(index));
+        let images = images.collect::<Result<Vec<_>, _>>()?;
+        let mut textures = Vec::with_capacity(document.textures.len());
+        for (index, texture) in document.textures.iter().enumerate() {
+            let source = texture.source.or_else(|| texture.source_of(WEBP));
+            let picture = source.and_then(|source| images[source].clone());
+            if picture.is_none() {
+                warnings.push(format!(
+                    "texture {index} {}; materials have their factors alone",
+                    what_it_lacks(texture)
+                ));
+            }
+            textures.push(picture.map(|source| FileTextureUse {
+                source,
+                wrap: wrap(document, texture),
+                uv: UvTransform::default(),
+                from: String::new(), // the material tells
+            }));
+        }
+        Ok(Self { document, textures })
+    }
+}
+
+/// Copies the pictures that buffers hold, each once: they outlive the buffers.
+struct Pictures<'a> {
+    document: &'a Document,
+    buffers: &'a Buffers<'a>,
+    uris: Uris<'a>,
+    /// By where they lie.
+    copied: HashMap<*const [u8], Arc<[u8]>>,
+    /// Bytes that may still be copied: pictures do not overlap.
+    left: usize,
+}
+
+impl<'a> Pictures<'a> {
+    fn new(document: &'a Document, buffers: &'a Buffers<'a>, uris: Uris<'a>) -> Self {
+        Self {
+            document,
+            buffers,
+            uris,
+            copied: HashMap::new(),
+            left: buffers.len(),
+        }
+    }
+
+    /// Picture number `index`, if the document says where it is.
+    fn get(&mut self, index: usize) -> Result<Option<FileTexture>, LoadMeshErrorKind> {
+        let image = &self.document.images[index];
+        let what = format!("image {index}");
+        Ok(match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => Some(match self.uris.resolve(uri, &what)? {
+                Resource::Bytes(bytes) => FileTexture::Embedded {
+                    name: called(index, image),
+                    bytes: bytes.into(),
+                },
+                Resource::File(file) => FileTexture::Path(file),
+            }),
+            (None, Some(view)) => {
+                let bytes = self.buffers.view(view as usize)?;
+                Some(FileTexture::Embedded {
+                    name: called(index, image),
+                    bytes: self.copy(bytes, &what)?,
+                })
+            }
+            (None, None) => None,
+        })
+    }
+
+    fn copy(&mut self, bytes: &[u8], what: &str) -> Result<Arc<[u8]>, LoadMeshErrorKind> {
+        if let Some(copy) = self.copied.get(&(&raw const *bytes)) {
+            return Ok(copy.clone());
+        }
+        let left = self.left.checked_sub(bytes.len());
+        self.left = left.ok_or_else(|| malformed(what, "it overlaps with other pictures"))?;
+        let copy: Arc<[u8]> = bytes.into();
+        self.copied.insert(bytes, copy.clone());
+        Ok(copy)
+    }
+}
+
+/// What messages call a picture inside the file.
+fn called(index: usize, image: &Image) -> String {
+    match &image.name {
+        Some(name) => format!("image {index} {name:?}"),
+        None => format!("image {index}"),
+    }
+}
+
+/// Why a texture has no picture.
+fn what_it_lacks(texture: &Texture) -> String {
+    let names: Vec<&str> = texture.extensions.keys().map(String::as_str).collect();
+    match (texture.source, &names[..]) {
+        (None, [_, ..]) => format!(
+            "has a picture by {} only, which is not read",
+            names.join(", ")
+        ),
+        _ => "has no picture".to_owned(),
+    }
+}
+
+/// The wrap modes along s and t.
+fn wrap(document: &Document, texture: &Texture) -> [Wrap; 2] {
+    let sampler = texture.sampler.map(|index| &document.samplers[index]);
+    let codes = sampler.map_or([None; 2], |sampler| [sampler.wrap_s, sampler.wrap_t]);
+    codes.map(|code| match code {
+        Some(CLAMP_TO_EDGE) => Wrap::Clamp,
+        Some(MIRRORED_REPEAT) => Wrap::Mirror,
+        _ => Wrap::Repeat,
+    })
 }
 
 impl Reader<'_> {
     /// Material number `index`.
     pub fn material(&self, index: usize) -> Option<FileMaterial> {
-        let json = self.document.as_json().materials.get(index)?;
-        let m = serde_json::to_value(json).ok()?;
+        let m = self.document.materials.get(index)?;
         let extension = |name: &str| format!("/extensions/KHR_materials_{name}");
-        let number = |at: String, default: f32| number(&m, &at, default);
+        let number = |at: String, default: f32| number(m, &at, default);
         let pbr = "/pbrMetallicRoughness";
         let strength = number(extension("emissive_strength") + "/emissiveStrength", 1.0).max(0.0);
-        let mut emission = self.color(&m, "/emissiveFactor", "/emissiveTexture", Vec3::ZERO);
+        let mut emission = self.color(m, "/emissiveFactor", "/emissiveTexture", Vec3::ZERO);
         emission.factor *= strength;
-        let rough_metal = self.texture(&m, &format!("{pbr}/metallicRoughnessTexture"));
+        let rough_metal = self.texture(m, &format!("{pbr}/metallicRoughnessTexture"));
         let of_rough_metal = |factor: &str, channel| FileScalar {
             factor: number(format!("{pbr}/{factor}"), 1.0).clamp(0.0, 1.0),
             texture: rough_metal.clone().map(|t| (t, channel)),
@@ -48,7 +177,7 @@ impl Reader<'_> {
             FileScalar {
                 factor: number(format!("{at}/{factor}"), default).clamp(0.0, 1.0),
                 texture: self
-                    .texture(&m, &format!("{at}/{texture}"))
+                    .texture(m, &format!("{at}/{texture}"))
                     .map(|t| (t, channel)),
             }
         };
@@ -60,7 +189,7 @@ impl Reader<'_> {
         Some(FileMaterial {
             name: m["name"].as_str().unwrap_or("").to_owned(),
             base_color: self.color(
-                &m,
+                m,
                 &format!("{pbr}/baseColorFactor"),
                 &format!("{pbr}/baseColorTexture"),
                 Vec3::ONE,
@@ -76,7 +205,7 @@ impl Reader<'_> {
                 "r",
                 0.0,
             ),
-            attenuation_color: vector(&m, &(volume + "/attenuationColor"), Vec3::ONE)
+            attenuation_color: vector(m, &(volume + "/attenuationColor"), Vec3::ONE)
                 .clamp(Vec3::ZERO, Vec3::ONE),
             attenuation_distance: if distance > 0.0 {
                 distance
@@ -92,7 +221,7 @@ impl Reader<'_> {
                 0.0,
             ),
             sheen_color: self.color(
-                &m,
+                m,
                 &format!("{sheen}/sheenColorFactor"),
                 &format!("{sheen}/sheenColorTexture"),
                 Vec3::ZERO,
@@ -105,11 +234,11 @@ impl Reader<'_> {
                 0.0,
             ),
             emission,
-            opacity: self.opacity(&m),
+            opacity: self.opacity(m),
             opacity_cutoff: (m["alphaMode"] == "MASK")
                 .then(|| number("/alphaCutoff".into(), 0.5).max(0.0)),
             detail: self
-                .texture(&m, "/normalTexture")
+                .texture(m, "/normalTexture")
                 .map(|texture| FileDetail::NormalMap {
                     texture,
                     strength: number("/normalTexture/scale".into(), 1.0),
@@ -131,12 +260,43 @@ impl Reader<'_> {
         }
     }
 
+    /// The name of material number `index`, perhaps empty.
+    pub fn name(&self, index: usize) -> &str {
+        let material = self.document.materials.get(index);
+        material.and_then(|m| m["name"].as_str()).unwrap_or("")
+    }
+
+    /// The transform that undoes the quantisation of a mesh's texture coordinates (KHR_mesh_quantization): the one that all textures of
+    /// material number `index` share. The mesh's coordinates take it in, so that a displacement map lies right, and the
+    /// material's textures do without.
+    pub fn dequantization(&self, index: usize) -> Option<UvTransform> {
+        self.document
+            .materials
+            .get(index)
+            .and_then(|m| self.shared_transform(m))
+    }
+
+    fn shared_transform(&self, m: &Value) -> Option<UvTransform> {
+        if !self.document.uses("KHR_mesh_quantization") {
+            return None;
+        }
+        let mut transforms = Vec::new();
+        each_texture(m, &mut |info| {
+            transforms.push(uv_transform(transform_of(info)))
+        });
+        let (first, others) = transforms.split_first()?;
+        others.iter().all(|other| other == first).then_some(*first)
+    }
+
     /// The sets of texture coordinates that the textures of material number `index` are read by, but for occlusion, which we do not read.
     pub fn texcoord_sets(&self, index: usize) -> BTreeSet<u32> {
         let mut sets = BTreeSet::new();
-        let json = self.document.as_json().materials.get(index);
-        if let Some(Ok(m)) = json.map(serde_json::to_value) {
-            add_texcoord_sets(&m, &mut sets);
+        if let Some(m) = self.document.materials.get(index) {
+            each_texture(m, &mut |info| {
+                let set = transform_of(info)["texCoord"].as_u64();
+                let set = set.or(info["texCoord"].as_u64());
+                sets.insert(set.unwrap_or(0).try_into().unwrap_or(u32::MAX));
+            });
         }
         sets
     }
@@ -151,45 +311,20 @@ impl Reader<'_> {
     /// The texture that the object at `pointer` refers to.
     fn texture(&self, m: &Value, pointer: &str) -> Option<FileTextureUse> {
         let info = m.pointer(pointer)?;
-        let root = self.document.as_json();
-        let texture = root
-            .textures
-            .get(usize::try_from(info["index"].as_u64()?).ok()?)?;
-        let sampler = texture.sampler.and_then(|s| root.samplers.get(s.value()));
-        let wrap = sampler.and_then(|s| serde_json::to_value(s).ok()?["wrapS"].as_u64());
+        let index = usize::try_from(info["index"].as_u64()?).ok()?;
+        let texture = self.textures.get(index)?.clone()?;
         Some(FileTextureUse {
-            source: self.image(texture.source.value())?,
-            wrap: match wrap {
-                Some(CLAMP_TO_EDGE) => Wrap::Clamp,
-                Some(MIRRORED_REPEAT) => Wrap::Mirror,
-                _ => Wrap::Repeat,
+            uv: match self.shared_transform(m) {
+                Some(_) => UvTransform::default(),
+                None => uv_transform(transform_of(info)),
             },
-            uv: uv_transform(&info["extensions"]["KHR_texture_transform"]),
             from: format!(
                 "{} of material {:?}",
                 pointer.rsplit('/').next().unwrap_or(pointer),
                 m["name"].as_str().unwrap_or("")
             ),
+            ..texture
         })
-    }
-
-    fn image(&self, index: usize) -> Option<FileTexture> {
-        let image = self.document.as_json().images.get(index)?;
-        let embedded = |bytes: &[u8]| FileTexture::Embedded {
-            name: match &image.name {
-                Some(name) => format!("image {index} {name:?}"),
-                None => format!("image {index}"),
-            },
-            bytes: bytes.into(),
-        };
-        if let Some(uri) = &image.uri {
-            return match uri.strip_prefix("data:") {
-                Some(data) => Some(embedded(&base64(data.split_once(";base64,")?.1)?)),
-                None => Some(FileTexture::Path(beside(self.path, &percent_decoded(uri)))),
-            };
-        }
-        let bytes = view_bytes(self.document, image.buffer_view?.value(), self.buffers)?;
-        Some(embedded(bytes))
     }
 }
 
@@ -213,19 +348,23 @@ fn uv_transform(t: &Value) -> UvTransform {
     }
 }
 
-fn add_texcoord_sets(m: &Value, sets: &mut BTreeSet<u32>) {
+/// Shows `visit` every reference of a material to a texture, but for occlusion, which is not read.
+fn each_texture(m: &Value, visit: &mut impl FnMut(&Value)) {
     for (key, value) in m.as_object().into_iter().flatten() {
         if key == "occlusionTexture" {
             continue;
         }
         if value["index"].is_u64() {
-            let transform = &value["extensions"]["KHR_texture_transform"]["texCoord"];
-            let set = transform.as_u64().or(value["texCoord"].as_u64());
-            sets.insert(set.unwrap_or(0).try_into().unwrap_or(u32::MAX));
+            visit(value);
         } else {
-            add_texcoord_sets(value, sets);
+            each_texture(value, visit);
         }
     }
+}
+
+/// The extension's object, if it is there.
+fn transform_of(info: &Value) -> &Value {
+    &info["extensions"]["KHR_texture_transform"]
 }
 
 fn number(m: &Value, pointer: &str, default: f32) -> f32 {

@@ -1,0 +1,20 @@
+//! What mesh files may do: options shared by the verbs that load them.
+
+use crate::scene::load::LoadOptions;
+
+/// Options of loading.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct LoadArgs {
+    /// Let glTF files name buffers and pictures outside of their own folder
+    #[arg(long)]
+    allow_external: bool,
+}
+
+impl LoadArgs {
+    /// For the loader.
+    pub fn options(self) -> LoadOptions {
+        LoadOptions {
+            allow_external: self.allow_external,
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Which extensions a file may require.
+
+use super::LoadMeshErrorKind;
+use super::document::Document;
+
+/// Extensions that are read.
+const READ: [&str; 15] = [
+    "KHR_draco_mesh_compression",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "EXT_meshopt_compression",
+    "EXT_mesh_gpu_instancing",
+    "KHR_node_visibility",
+    "KHR_texture_transform",
+    "EXT_texture_webp",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_materials_specular",
+    "KHR_materials_clearcoat",
+    "KHR_materials_sheen",
+];
+
+/// What the names of extensions hold that change a shape: codecs, strips that end inside, shapes without triangles.
+const SHAPES: [&str; 4] = [
+    "_compression",
+    "_primitive_restart",
+    "_implicit_",
+    "_mesh_linking",
+];
+
+/// One warning per required extension that is not read, but leaves the shape alone.
+///
+/// # Errors
+///
+/// A required extension without which the shape is another one.
+pub(super) fn check(document: &Document) -> Result<Vec<String>, LoadMeshErrorKind> {
+    let required = document.extensions_required.iter();
+    let mut warnings = Vec::new();
+    for name in required.filter(|name| !READ.contains(&name.as_str())) {
+        if SHAPES.iter().any(|part| name.contains(part)) {
+            return Err(LoadMeshErrorKind::Unsupported {
+                what: format!("the glTF extension {name}, which the file requires,"),
+            });
+        }
+        warnings.push(format!("it requires the extension {name}, which is not read; the shape is taken to be the same without"));
+    }
+    Ok(warnings)
+}
