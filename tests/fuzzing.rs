@@ -13,7 +13,7 @@ use loaders::mutate::{Random, damaged, mend};
 use loaders::{TARGETS, Target};
 
 /// Damaged files per target: about a minute for all of them, in a debug build on two cores.
-const INPUTS: usize = 2000;
+const INPUTS: usize = 5000;
 
 /// Most address space of the process: what all threads may have at once, whatever headers claim.
 #[cfg(target_os = "linux")]
