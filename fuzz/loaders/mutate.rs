@@ -1,4 +1,5 @@
 //! Damage to files, drawn from a seed: what bad disks, bad programs and bad people do.
+#![allow(dead_code)] // whoever includes it uses its own part
 
 /// Marsaglia's xorshift, 64 bits: the same numbers everywhere.
 pub struct Random(u64);

@@ -93,11 +93,19 @@ macro_rules! failure_from {
 failure_from! {
     MeshError => prismarch_status_PRISMARCH_ERROR_DATA,
     MotionError => prismarch_status_PRISMARCH_ERROR_DATA,
-    SurfaceError => prismarch_status_PRISMARCH_ERROR_ARGUMENT,
     MarchError => prismarch_status_PRISMARCH_ERROR_ARGUMENT,
     InterpolateError => prismarch_status_PRISMARCH_ERROR_ARGUMENT,
     ImageError => prismarch_status_PRISMARCH_ERROR_FILE,
     EmbreeError => prismarch_status_PRISMARCH_ERROR_EMBREE,
+}
+
+impl From<SurfaceError> for Failure {
+    fn from(error: SurfaceError) -> Self {
+        match error {
+            SurfaceError::TooHigh { .. } | SurfaceError::TooFine { .. } => Self::data(error),
+            _ => Self::argument(error),
+        }
+    }
 }
 
 impl From<MapError> for Failure {

@@ -334,6 +334,11 @@ fn show(text: &[u8]) -> String {
     }
 }
 
+/// The damage that files of all kinds are held to.
+#[cfg(test)]
+#[path = "../../fuzz/loaders/mutate.rs"]
+mod mutate;
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -341,7 +346,11 @@ mod tests {
     use super::*;
 
     fn read(table: &'static str) -> Result<Vec<Ray>, RayError> {
-        let mut reader = RayReader::new("rays.csv".into(), Box::new(table.as_bytes()))?;
+        read_bytes(table.into())
+    }
+
+    fn read_bytes(table: Vec<u8>) -> Result<Vec<Ray>, RayError> {
+        let mut reader = RayReader::new("rays.csv".into(), Box::new(io::Cursor::new(table)))?;
         let mut rows = vec![Row::default(); 3];
         let mut rays = Vec::new();
         loop {
@@ -377,6 +386,32 @@ mod tests {
             intervals,
             [(0.0, f32::INFINITY), (2.0, f32::INFINITY), (7.0, 7.0)]
         );
+    }
+
+    #[test]
+    fn damaged_tables_are_read_or_refused() {
+        let tables: [&[u8]; 2] = [
+            b"ox,oy,oz,dx,dy,dz\n0,0,5,0,0,-1\n1.5,-2e-3,4,0.1,0.2,-1\n",
+            b"\xef\xbb\xbftnear,tfar,dx,dy,dz,ox,oy,oz\r\n0,inf,0,0,-2,1,2,3\r\n,,1,0,0,0,0,0\r\n",
+        ];
+        let mut random = mutate::Random::new(1);
+        let mut taken = 0;
+        for round in 0..5000 {
+            let table = mutate::damaged(
+                &mut random,
+                tables[round % 2],
+                tables[(round + 1) % 2],
+                true,
+            );
+            match read_bytes(table) {
+                Ok(rays) => {
+                    taken += 1;
+                    assert!(rays.iter().all(Ray::is_valid));
+                }
+                Err(error) => assert!(error.to_string().contains("rays.csv")),
+            }
+        }
+        assert!((100..4900).contains(&taken), "{taken}");
     }
 
     #[test]
