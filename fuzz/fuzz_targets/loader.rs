@@ -1,6 +1,7 @@
 //! One kind of file, named by PRISMARCH_FUZZ_LOADER: see `loaders`. Its folder is made anew in the system's temporary folder for each process.
 #![no_main]
 
+#[allow(dead_code)] // the seeded run has uses for more of it
 #[path = "../loaders/mod.rs"]
 mod loaders;
 

@@ -139,7 +139,7 @@ fn replace_word(random: &mut Random, bytes: &mut Vec<u8>) {
 }
 
 /// Makes the lengths and check sums of a damaged file fit again, so that what is behind them is reached.
-pub fn mend(bytes: &mut Vec<u8>) {
+pub fn mend(bytes: &mut [u8]) {
     if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
         mend_png(bytes);
     } else if bytes.starts_with(b"glTF") && bytes.len() >= 12 {

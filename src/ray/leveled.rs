@@ -6,7 +6,9 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Ray, RayPacket};
+use super::Ray;
+#[cfg(feature = "embree")]
+use super::RayPacket;
 
 /// The largest components that are left as they are: with an instance that stretches by
 /// [`MAX_STRETCH`](crate::trace::MAX_STRETCH) they stay within 1e-15 to 1e15.
@@ -58,6 +60,7 @@ impl Leveled {
     }
 }
 
+#[cfg(feature = "embree")]
 impl RayPacket {
     /// Bit i tells whether the direction of lane i is near length 1.
     #[inline]
@@ -122,6 +125,7 @@ mod tests {
         assert!(ray.leveled().original_t(1e-8).is_some());
     }
 
+    #[cfg(feature = "embree")]
     #[test]
     fn lanes_are_level_as_their_rays_are() {
         let lengths = [1e-45, 1e-4, 1e-3, 1.0, 1000.0, 1024.0, 1025.0, 1.8e18];

@@ -123,7 +123,7 @@ fn a_name_of_any_length_that_the_system_takes_is_written() {
     let longest = "x".repeat(255);
     let path = folder.path().join(&longest);
     write(&path, |out| out.write_all(b"new")).unwrap();
-    assert_eq!(names(folder.path()), [longest.clone()]);
+    assert_eq!(names(folder.path()), std::slice::from_ref(&longest));
     let longer = folder.path().join(longest + "x");
     assert!(matches!(check(&longer), Err(OutputError::Failed { .. })));
 }
