@@ -22,9 +22,11 @@ const MOST_BYTES: u64 = 4 << 30;
 /// Files that are sound have names that begin with this; the others once did harm, or may be refused.
 const SOUND: &str = "good-";
 
-fn limit_memory() {
-    static LIMITED: Once = Once::new();
-    LIMITED.call_once(|| {
+/// Within memory, and so that the input of a panic stays in its folder.
+fn prepare() {
+    static PREPARED: Once = Once::new();
+    PREPARED.call_once(|| {
+        loaders::end_at_own_panics();
         #[cfg(target_os = "linux")]
         {
             use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -54,7 +56,7 @@ fn corpus(target: &Target) -> Vec<(String, Vec<u8>)> {
 }
 
 fn holds(name: &str) {
-    limit_memory();
+    prepare();
     let target = loaders::find(name).unwrap();
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .join("fuzzing")

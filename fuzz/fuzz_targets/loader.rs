@@ -8,11 +8,12 @@ mod loaders;
 use std::sync::OnceLock;
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
-use loaders::{Bench, find, mutate};
+use loaders::{Bench, end_at_own_panics, find, mutate};
 
 fn bench() -> &'static Bench<'static> {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| {
+        end_at_own_panics();
         let name = std::env::var("PRISMARCH_FUZZ_LOADER").unwrap_or_default();
         let target =
             find(&name).unwrap_or_else(|| panic!("PRISMARCH_FUZZ_LOADER={name}: no such target"));

@@ -7,6 +7,7 @@
 pub mod mutate;
 
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
@@ -196,6 +197,22 @@ impl Bench<'_> {
             error
         })
     }
+}
+
+/// From now on a panic of prismarch's own ends the process also where it would be caught, in what guards the decoders of other crates.
+pub fn end_at_own_panics() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        if !prismarch::files::is_guarded() {
+            return usual(info);
+        }
+        let file = info.location().map_or("", |place| place.file());
+        if !file.contains("/registry/") && !file.starts_with("/rustc/") {
+            // Not by `eprintln`, which tests keep to themselves.
+            let _ = writeln!(std::io::stderr(), "{info}");
+            std::process::abort();
+        }
+    }));
 }
 
 /// What was loaded can be traced, and its hits are points.

@@ -26,7 +26,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::files::guard::keep_caught_panics_quiet;
+use crate::files::keep_caught_panics_quiet;
 use error::CliError;
 
 /// Exit codes, and where to read on.

@@ -19,11 +19,16 @@ pub fn guarded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     decoded.map_err(|_| "the decoder stumbled over it; is it damaged?".to_owned())
 }
 
+/// Whether this thread is in a decoder whose panics are caught: for panic hooks.
+pub fn is_guarded() -> bool {
+    GUARDED.get()
+}
+
 /// For programs: panics that [`guarded`] catches leave no trace on the standard error stream, all others do as before.
 pub fn keep_caught_panics_quiet() {
     let usual = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
-        if !GUARDED.get() {
+        if !is_guarded() {
             usual(info);
         }
     }));
@@ -38,6 +43,6 @@ mod tests {
         assert_eq!(guarded(|| 3), Ok(3));
         let hollow: Result<(), String> = guarded(|| panic!("inside a test"));
         assert!(hollow.unwrap_err().contains("stumbled"));
-        assert!(!GUARDED.get());
+        assert!(!is_guarded());
     }
 }

@@ -7,5 +7,6 @@ pub mod input;
 pub mod output;
 mod outputs;
 
+pub use guard::{is_guarded, keep_caught_panics_quiet};
 pub use output::OutputError;
 pub use outputs::Outputs;

@@ -4,10 +4,11 @@
 //! what the primitive's accessors announce, and that to what a stream of its length can plausibly carry.
 
 use std::collections::BTreeMap;
-use std::panic::catch_unwind;
 
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute};
 use serde::Deserialize;
+
+use crate::files::guard::guarded;
 
 use super::gltf::Kind;
 
@@ -49,13 +50,12 @@ pub(super) struct Unpacked {
 pub(super) fn decode(stream: &[u8], announced: Announced) -> Result<Unpacked, String> {
     let limits = limits(stream.len(), announced)?;
     // The crate means never to panic; that is too much to rely on for every damaged stream.
-    let mesh = catch_unwind(|| {
+    let mesh = guarded(|| {
         let mut mesh = Mesh::new();
         let mut buffer = DecoderBuffer::new(stream).with_limits(limits);
         MeshDecoder::new().decode(&mut buffer, &mut mesh)?;
         Ok::<_, draco_core::DracoError>(mesh)
-    })
-    .map_err(|_| "the decoder stumbled over it; is it damaged?".to_owned())?
+    })?
     .map_err(|e| e.to_string())?;
     Ok(Unpacked {
         triangles: mesh.faces().iter().map(|f| f.map(|p| p.0)).collect(),
