@@ -1,4 +1,4 @@
-//! Small files that claim large pictures, under a limit of memory: each is refused in one sentence, none ends the program.
+//! Small files that claim large pictures and meshes, under a limit of memory: each is refused in one sentence, none ends the program.
 
 mod program;
 
@@ -7,12 +7,11 @@ use program::{Folder, QUAD, stderr};
 /// The deflated zeros of a PNG's or EXR's pixels: a stored block of none.
 const NOTHING: [u8; 11] = [0x78, 1, 1, 0, 0, 0xff, 0xff, 0, 0, 0, 1];
 
-/// Runs `query` on a map under a limit of so many KB of address space.
+/// Runs `query` on a mesh and a map under a limit of so many KB of address space.
 #[cfg(unix)]
-fn query(folder: &Folder, map: &str, limit: u64) -> std::process::Output {
-    let arguments =
-        "query --mesh quad.obj --scale 1 --rays rays.csv --backend bvh --threads 1 --map";
-    let arguments: Vec<&str> = arguments.split(' ').chain([map]).collect();
+fn query(folder: &Folder, [mesh, map]: [&str; 2], limit: u64) -> std::process::Output {
+    let arguments = "query --scale 1 --rays rays.csv --backend bvh --threads 1 --mesh";
+    let arguments: Vec<&str> = arguments.split(' ').chain([mesh, "--map", map]).collect();
     folder.run_in_memory(limit, &arguments)
 }
 
@@ -26,7 +25,7 @@ fn folder() -> Folder {
 /// What a sound map needs, and what is granted besides.
 #[cfg(unix)]
 fn limit(folder: &Folder) -> u64 {
-    let needs = |limit| query(folder, "flat.png", limit).status.code() == Some(0);
+    let needs = |limit| query(folder, ["quad.obj", "flat.png"], limit).status.code() == Some(0);
     let mut limit = 16 << 10;
     while !needs(limit) {
         limit += 16 << 10;
@@ -35,19 +34,11 @@ fn limit(folder: &Folder) -> u64 {
     limit + (64 << 10)
 }
 
-fn crc(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(!0, |crc, &byte| {
-        (0..8).fold(crc ^ u32::from(byte), |crc: u32, _| {
-            (crc >> 1) ^ (0xedb8_8320 * (crc & 1))
-        })
-    })
-}
-
 fn png(width: u32, height: u32, interlaced: u8) -> Vec<u8> {
     let chunk = |name: &[u8], data: &[u8]| {
         let body = [name, data].concat();
         let length = (data.len() as u32).to_be_bytes();
-        [&length[..], &body, &crc(&body).to_be_bytes()].concat()
+        [&length[..], &body, &crc32fast::hash(&body).to_be_bytes()].concat()
     };
     let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
     let header = [&size[..], &[16, 6, 0, 0, interlaced]].concat();
@@ -183,13 +174,108 @@ fn small_files_that_claim_large_pictures_are_refused_in_little_memory() {
     let limit = limit(&folder);
     for (name, bytes) in hostile() {
         folder.put(&name, &bytes);
-        let output = query(&folder, &name, limit);
-        let said = stderr(&output);
-        assert_eq!(output.status.code(), Some(3), "{name}: {said}");
-        assert!(
-            said.contains(&name) && !said.contains("panicked"),
-            "{name}: {said}"
-        );
-        assert_eq!(said.trim_end().lines().count(), 1, "{name}: {said}");
+        refused(&name, &query(&folder, ["quad.obj", &name], limit));
     }
+}
+
+#[cfg(unix)]
+#[track_caller]
+fn refused(name: &str, output: &std::process::Output) {
+    let said = stderr(output);
+    assert_eq!(output.status.code(), Some(3), "{name}: {said}");
+    assert!(
+        said.contains(name) && !said.contains("panicked"),
+        "{name}: {said}"
+    );
+    assert_eq!(said.trim_end().lines().count(), 1, "{name}: {said}");
+}
+
+/// A glTF triangle, with something of its document replaced.
+fn gltf(from: &str, to: &str) -> Vec<u8> {
+    let document = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+    assert!(document.contains(from), "{from}");
+    document.replace(from, to).into_bytes()
+}
+
+#[cfg(unix)]
+#[test]
+fn small_files_that_claim_large_meshes_are_refused_in_little_memory() {
+    let folder = folder();
+    let limit = limit(&folder);
+    let vertices =
+        "element vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\n";
+    let one = vertices.replace("4000000000", "1");
+    let ply = |format: &str, elements: &[&str], body: &[u8]| {
+        let header = format!(
+            "ply\nformat {format} 1.0\n{}end_header\n",
+            elements.concat()
+        );
+        [header.as_bytes(), body].concat()
+    };
+    let faces = "element face 1\nproperty list uint int vertex_indices\n";
+    let view = r#"{"buffer":0,"byteLength":36}"#;
+    let meshopt = format!(
+        r#"{{"buffer":0,"byteLength":36,"extensions":{{"EXT_meshopt_compression":{{"buffer":0,"byteLength":36,"byteStride":12,
+        "count":{},"mode":"ATTRIBUTES"}}}}}}"#,
+        u32::MAX
+    );
+    let files = [
+        ("text.ply", ply("ascii", &[vertices], b"0 0 0\n")),
+        (
+            "binary.ply",
+            ply("binary_little_endian", &[vertices], &[0; 36]),
+        ),
+        (
+            "list.ply",
+            ply(
+                "binary_little_endian",
+                &[&one, faces],
+                &[[0; 12], [0xee; 12]].concat(),
+            ),
+        ),
+        ("count.gltf", gltf("\"count\":3", "\"count\":4294967295")),
+        (
+            "zeros.gltf",
+            gltf(
+                "\"bufferView\":0,\"componentType\":5126,\"count\":3",
+                "\"componentType\":5126,\"count\":4294967295",
+            ),
+        ),
+        (
+            "buffer.gltf",
+            gltf(
+                "\"buffers\":[{\"byteLength\":36",
+                "\"buffers\":[{\"byteLength\":4294967295",
+            ),
+        ),
+        ("meshopt.gltf", gltf(view, &meshopt)),
+        (
+            "sparse.gltf",
+            gltf(
+                "\"count\":3",
+                r#""count":3,"sparse":{"count":4294967295,"indices":{"bufferView":0,"componentType":5125},"values":{"bufferView":0}}"#,
+            ),
+        ),
+    ];
+    for (name, bytes) in files {
+        folder.put(name, &bytes);
+        refused(name, &query(&folder, [name, "flat.png"], limit));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_library_is_in_memory_once_however_often_it_is_named() {
+    let folder = folder();
+    let library: String = (0..20_000)
+        .map(|i| format!("newmtl m{i}\nKd 0.5 0.5 0.5\n"))
+        .collect();
+    folder.put("lib.mtl", &library);
+    folder.put("often.obj", "mtllib lib.mtl\n".repeat(400) + QUAD);
+    let output = query(&folder, ["often.obj", "flat.png"], limit(&folder));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
