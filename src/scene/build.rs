@@ -473,13 +473,20 @@ fn told(joined: &Joined) -> Option<String> {
         normals,
         texcoords,
     } = *joined;
-    let vertices = format!("{positions} vertices up to {farthest:.1e} away from others");
+    let counted = |count: usize, one: &str, many: &str| {
+        let what = if count == 1 { one } else { many };
+        format!("{count} {what}")
+    };
+    let vertices = counted(positions, "vertex", "vertices");
     let parts = [
-        (positions, vertices),
-        (normals, format!("{normals} normals")),
+        (
+            positions,
+            format!("{vertices} up to {farthest:.1e} away from others"),
+        ),
+        (normals, counted(normals, "normal", "normals")),
         (
             texcoords,
-            format!("{texcoords} pairs of texture coordinates"),
+            counted(texcoords, "texture coordinate", "texture coordinates"),
         ),
     ];
     let parts: Vec<_> = parts

@@ -133,15 +133,18 @@ impl Assets {
 
     /// What is shown for a colour picture that cannot be read: no one takes it for the real one.
     pub fn stand_in(&mut self) -> Arc<ColorImage> {
+        /// Pixels per cell, so that its edges stay sharp though pixels are bilinear.
+        const CELL: usize = 16;
+        const SIDE: usize = 8 * CELL;
         let checker = || {
-            let color = |i: usize| match (i % 8 + i / 8) % 2 {
+            let color = |i: usize| match (i % SIDE / CELL + i / SIDE / CELL) % 2 {
                 0 => [255, 0, 255],
                 _ => [0, 0, 0],
             };
             Arc::new(ColorImage {
-                width: 8,
-                height: 8,
-                pixels: ColorPixels::Srgb8((0..64).map(color).collect()),
+                width: SIDE,
+                height: SIDE,
+                pixels: ColorPixels::Srgb8((0..SIDE * SIDE).map(color).collect()),
             })
         };
         self.stand_in.get_or_insert_with(checker).clone()
