@@ -24,7 +24,7 @@ pub fn is_guarded() -> bool {
     GUARDED.get()
 }
 
-/// For programs: panics that [`guarded`] catches leave no trace on the standard error stream, all others do as before.
+/// For programs: panics in decoders, which are caught and become errors, leave no trace on the standard error stream, all others do as before.
 pub fn keep_caught_panics_quiet() {
     let usual = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
