@@ -3,12 +3,11 @@
 
 mod program;
 
-use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::process::{Command, Output, Stdio};
 
 use prismarch::image::{ExrChannel, write_exr, write_png_gray16, write_png_rgb8};
-use program::{Folder, QUAD, SCENE, stderr, stdout};
+use program::{Folder, QUAD, SCENE, done, is_refusal, line_refused, stderr, stdout};
 
 const USAGE: i32 = 2;
 const OUTPUT: i32 = 4;
@@ -60,41 +59,6 @@ file = \"sky.exr\"
     folder
 }
 
-/// What all files hold, by name; links are told by what they lead to.
-fn contents(folder: &Folder) -> BTreeMap<String, Option<Vec<u8>>> {
-    let names = folder.names().into_iter();
-    names
-        .map(|name| (name.clone(), fs::read(folder.path(&name)).ok()))
-        .collect()
-}
-
-#[track_caller]
-fn done(folder: &Folder, arguments: &str) -> Output {
-    let arguments: Vec<&str> = arguments.split(' ').collect();
-    let output = folder.run(&arguments);
-    assert!(output.status.success(), "{}", stderr(&output));
-    output
-}
-
-#[track_caller]
-fn refused(folder: &Folder, arguments: &str, code: i32, words: &[&str]) {
-    let before = contents(folder);
-    let words_of: Vec<&str> = arguments.split(' ').collect();
-    let output = folder.run(&words_of);
-    holds(&output, arguments, code, words);
-    assert!(contents(folder) == before, "{arguments}: files changed");
-}
-
-#[track_caller]
-fn holds(output: &Output, arguments: &str, code: i32, words: &[&str]) {
-    let message = stderr(output);
-    assert_eq!(output.status.code(), Some(code), "{arguments}: {message}");
-    for word in words {
-        assert!(message.contains(word), "{arguments}: no {word}: {message}");
-    }
-    assert!(!message.contains("rendering"), "{arguments}: {message}");
-}
-
 #[test]
 fn no_file_of_the_scene_is_written_over_under_any_name() {
     let folder = folder();
@@ -105,7 +69,7 @@ fn no_file_of_the_scene_is_written_over_under_any_name() {
                 "render scene.toml -o free.png --stats",
                 "query scene.toml --rays rays.csv -o",
             ] {
-                refused(&folder, &format!("{run} {name}"), USAGE, &[name, input]);
+                line_refused(&folder, &format!("{run} {name}"), USAGE, &[name, input]);
             }
         }
     }
@@ -123,7 +87,7 @@ fn links_of_either_kind_lead_to_the_files_of_the_scene() {
         symlink("../soft.exr", folder.path("inner/softer.png")).unwrap();
         for output in ["hard.exr", "soft.exr", "inner/softer.png", "here/soft.exr"] {
             let run = format!("render scene.toml -o {output}");
-            refused(&folder, &run, USAGE, &[output, input]);
+            line_refused(&folder, &run, USAGE, &[output, input]);
         }
         for link in ["hard.exr", "soft.exr", "inner/softer.png"] {
             fs::remove_file(folder.path(link)).unwrap();
@@ -132,9 +96,9 @@ fn links_of_either_kind_lead_to_the_files_of_the_scene() {
     // The scene may be read by a link, too, and the picture that is gone on with may be none of its own.
     symlink("scene.toml", folder.path("by_link.toml")).unwrap();
     let stats = "render by_link.toml -o a.png --stats scene.toml";
-    refused(&folder, stats, USAGE, &["scene.toml", "by_link.toml"]);
+    line_refused(&folder, stats, USAGE, &["scene.toml", "by_link.toml"]);
     let resume = "render scene.toml -o sky.exr --resume";
-    refused(&folder, resume, USAGE, &["sky.exr"]);
+    line_refused(&folder, resume, USAGE, &["sky.exr"]);
 }
 
 #[test]
@@ -142,7 +106,7 @@ fn a_query_keeps_its_rays_mesh_and_map() {
     let folder = folder();
     let query = "query --mesh quad.obj --map flat.png --scale 0.2 --rays rays.csv -o";
     for input in ["rays.csv", "quad.obj", "flat.png"] {
-        refused(&folder, &format!("{query} {input}"), USAGE, &[input]);
+        line_refused(&folder, &format!("{query} {input}"), USAGE, &[input]);
     }
     done(&folder, &format!("{query} hits.csv"));
 }
@@ -165,11 +129,11 @@ fn files_that_a_mesh_file_names_are_kept() {
         ("corners.gltf --texcoords planar", "corners.bin"),
     ] {
         let query = format!("query --mesh {mesh} {rest}");
-        refused(&folder, &format!("{query} {input}"), USAGE, &[input]);
+        line_refused(&folder, &format!("{query} {input}"), USAGE, &[input]);
         done(&folder, &format!("{query} hits.csv"));
     }
     let stats = "render scene.toml -o a.png --stats quad.mtl";
-    refused(&folder, stats, USAGE, &["quad.mtl"]);
+    line_refused(&folder, stats, USAGE, &["quad.mtl"]);
 }
 
 #[test]
@@ -185,7 +149,7 @@ fn a_merge_keeps_its_parts() {
         ("c.exr", "b.exr"),
     ] {
         let run = format!("merge a.exr b.exr -o {output}");
-        refused(&folder, &run, USAGE, &[output, input]);
+        line_refused(&folder, &run, USAGE, &[output, input]);
     }
     done(&folder, "merge a.exr b.exr -o whole.exr");
 }
@@ -211,7 +175,7 @@ fn run_with_streams(folder: &Folder, arguments: &str, stdin: Option<&str>, stdou
 fn standard_streams_are_files_like_others() {
     let folder = folder();
     folder.put("log", "");
-    let before = contents(&folder);
+    let before = folder.contents();
     let query = "query scene.toml --rays";
     for (arguments, stdin, stdout, words) in [
         (
@@ -264,8 +228,8 @@ fn standard_streams_are_files_like_others() {
         ),
     ] {
         let output = run_with_streams(&folder, arguments, stdin, stdout);
-        holds(&output, arguments, USAGE, &words);
-        assert!(contents(&folder) == before, "{arguments}: files changed");
+        is_refusal(&output, USAGE, &words);
+        assert!(folder.contents() == before, "{arguments}: files changed");
     }
     let output = run_with_streams(&folder, &format!("{query} -"), Some("rays.csv"), "log");
     assert!(output.status.success(), "{}", stderr(&output));
@@ -282,7 +246,7 @@ fn two_outputs_are_two_files() {
         }
         for stats in ["a.exr", "./a.exr", "inner/../a.exr"] {
             let run = format!("{render} a.exr --stats {stats}");
-            refused(&folder, &run, USAGE, &["a.exr", stats, "one file"]);
+            line_refused(&folder, &run, USAGE, &["a.exr", stats, "one file"]);
         }
     }
     #[cfg(unix)]
@@ -293,7 +257,7 @@ fn two_outputs_are_two_files() {
         symlink("b.exr", folder.path("dangling")).unwrap();
         for (output, stats) in [("a.exr", "hard"), ("a.exr", "soft"), ("b.exr", "dangling")] {
             let run = format!("{render} {output} --stats {stats}");
-            refused(&folder, &run, USAGE, &[output, stats, "one file"]);
+            line_refused(&folder, &run, USAGE, &[output, stats, "one file"]);
         }
     }
 }
@@ -305,27 +269,27 @@ fn a_picture_without_a_name_takes_one_that_is_free() {
         "flat.toml",
         folder.text("scene.toml").replace("spp = 1", "spp = 2"),
     );
-    let before = contents(&folder);
+    let before = folder.contents();
     let output = done(&folder, "render flat.toml");
     assert!(stdout(&output).starts_with("flat.render.png: 16x12"));
     assert!(stderr(&output).contains("warning: the picture is flat.render.png"));
-    let mut after = contents(&folder);
+    let mut after = folder.contents();
     assert!(after.remove("flat.render.png").is_some());
     assert!(after == before);
     // The name that is free is taken again, and not where it is read or written itself.
     done(&folder, "render flat.toml --quiet --stats flat.render2.png");
-    assert_eq!(contents(&folder).len(), before.len() + 2);
+    assert_eq!(folder.contents().len(), before.len() + 2);
     folder.put(
         "flat.toml",
         folder
             .text("flat.toml")
             .replace("paint.png", "flat.render.png"),
     );
-    let before = contents(&folder);
+    let before = folder.contents();
     let output = done(&folder, "render flat.toml --stats flat.render2.png");
     assert!(stdout(&output).starts_with("flat.render3.png: "));
     for (name, bytes) in before {
-        let same = contents(&folder)[&name] == bytes;
+        let same = folder.contents()[&name] == bytes;
         assert!(same || name == "flat.render2.png", "{name}");
     }
     // The scene itself may be called like a picture.
@@ -374,7 +338,7 @@ fn outputs_that_cannot_be_written_are_refused_before_the_first_ray() {
             runs.push(format!("merge part.exr -o {name}"));
         }
         for run in runs {
-            refused(&folder, &run, OUTPUT, &["cannot write"]);
+            line_refused(&folder, &run, OUTPUT, &["cannot write"]);
         }
     }
 }
@@ -425,7 +389,7 @@ fn inputs_that_are_no_files_are_refused_at_once() {
             format!("query --mesh quad.obj --map {input} --scale 1 --rays rays.csv"),
             format!("merge {input} -o a.png"),
         ] {
-            refused(&folder, &run, 3, &["it is a", input]);
+            line_refused(&folder, &run, 3, &["it is a", input]);
         }
     }
 }
@@ -454,7 +418,7 @@ fn a_demo_replaces_what_it_made_and_nothing_else() {
     let words = changed.map(path);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let words = [&words[..], &["--force"]].concat();
-    refused(&folder, &format!("{small} 256"), USAGE, &words);
+    line_refused(&folder, &format!("{small} 256"), USAGE, &words);
     assert!(names.map(read) == before);
     done(&folder, &format!("{small} 256 --force"));
     assert!(changed.iter().all(|name| !read(name).ends_with(b"# mine")));
@@ -471,11 +435,11 @@ fn a_demo_asks_where_nothing_is_its_own() {
     folder.put("asteroid/asteroid.toml", "mine");
     folder.put("asteroid/notes.txt", "mine");
     let run = "demo --no-render --map-size 256";
-    refused(&folder, run, USAGE, &["asteroid/asteroid.toml"]);
+    line_refused(&folder, run, USAGE, &["asteroid/asteroid.toml"]);
     assert_eq!(folder.text("asteroid/asteroid.toml"), "mine");
     assert!(!folder.path("asteroid/asteroid.obj").exists());
     done(&folder, &format!("{run} --force"));
     assert_eq!(folder.text("asteroid/notes.txt"), "mine");
     folder.put("asteroid/.prismarch-demo", "mine");
-    refused(&folder, run, USAGE, &[".prismarch-demo"]);
+    line_refused(&folder, run, USAGE, &[".prismarch-demo"]);
 }

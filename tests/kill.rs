@@ -3,12 +3,11 @@
 
 mod program;
 
-use std::collections::BTreeMap;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use prismarch::image::{ExrSamples, read_exr, write_png_gray16};
-use program::{Folder, stderr};
+use prismarch::image::{read_exr, write_png_gray16};
+use program::{Folder, Pixels, done, pixels};
 
 const KILLS: usize = 100;
 /// A whole run after this many that were killed.
@@ -24,28 +23,6 @@ fn folder() -> Folder {
     let heights: Vec<u16> = (0..32 * 32).map(noise).collect();
     write_png_gray16(&folder.path("flat.png"), 32, 32, &heights).unwrap();
     folder
-}
-
-/// The bits of all channels.
-type Pixels = BTreeMap<String, Vec<u32>>;
-
-fn pixels(folder: &Folder, name: &str) -> Pixels {
-    let picture = read_exr(&folder.path(name)).unwrap();
-    let channels = picture.channels.into_iter().map(|channel| {
-        let bits = match channel.samples {
-            ExrSamples::F32(s) => s.into_iter().map(f32::to_bits).collect(),
-            ExrSamples::U32(s) => s,
-        };
-        (channel.name, bits)
-    });
-    channels.collect()
-}
-
-#[track_caller]
-fn done(folder: &Folder, arguments: &str) {
-    let arguments: Vec<&str> = arguments.split(' ').collect();
-    let output = folder.run(&arguments);
-    assert!(output.status.success(), "{}", stderr(&output));
 }
 
 /// Uniform in [0, 1), the same in every run of the test: a linear congruential generator of 64 bits (Knuth's MMIX).
@@ -135,8 +112,8 @@ fn passes(folder: &Folder, seed: usize) -> Vec<Pixels> {
 
 /// Whether the file is the picture after some pass, in all channels that a complete picture has.
 fn is_pass(found: &Pixels, passes: &[Pixels]) -> bool {
-    let has = |(name, bits): (&String, _)| found.get(name) == Some(bits);
-    passes.iter().any(|pass| pass.iter().all(has))
+    let has = |(name, bits): (&String, _)| found.1.get(name) == Some(bits);
+    passes.iter().any(|pass| pass.1.iter().all(has))
 }
 
 #[test]

@@ -4,8 +4,8 @@ mod program;
 
 use std::collections::BTreeMap;
 
-use prismarch::image::{ExrSamples, read_exr, write_png_gray16};
-use program::{Folder, SCENE, stderr, stdout};
+use prismarch::image::{read_exr, write_png_gray16};
+use program::{Folder, SCENE, done, line_refused, pixels, stderr, stdout};
 
 /// The usual folder with bumps, so that every channel has something to tell.
 fn folder() -> Folder {
@@ -15,42 +15,6 @@ fn folder() -> Folder {
     write_png_gray16(&folder.path("flat.png"), 32, 32, &heights).unwrap();
     folder.put("scene.toml", SCENE.replace("spp = 1", "spp = 12"));
     folder
-}
-
-#[track_caller]
-fn done(folder: &Folder, arguments: &str) -> String {
-    let arguments: Vec<&str> = arguments.split(' ').collect();
-    let output = folder.run(&arguments);
-    assert!(output.status.success(), "{}", stderr(&output));
-    stdout(&output)
-}
-
-#[track_caller]
-fn refused(folder: &Folder, arguments: &str, code: i32, words: &[&str]) {
-    let before = folder.names();
-    let arguments: Vec<&str> = arguments.split(' ').collect();
-    let output = folder.run(&arguments);
-    let message = stderr(&output);
-    assert_eq!(output.status.code(), Some(code), "{message}");
-    for word in words {
-        assert!(message.contains(word), "no {word:?} in: {message}");
-    }
-    assert_eq!(folder.names(), before, "files changed");
-}
-
-/// Bits of every channel by name, and the window.
-type Pixels = ((i32, i32), BTreeMap<String, Vec<u32>>);
-
-fn pixels(folder: &Folder, name: &str) -> Pixels {
-    let picture = read_exr(&folder.path(name)).unwrap();
-    let channels = picture.channels.into_iter().map(|channel| {
-        let bits = match channel.samples {
-            ExrSamples::F32(s) => s.into_iter().map(f32::to_bits).collect(),
-            ExrSamples::U32(s) => s,
-        };
-        (channel.name, bits)
-    });
-    (picture.position, channels.collect())
 }
 
 fn attributes(folder: &Folder, name: &str) -> BTreeMap<String, String> {
@@ -101,7 +65,7 @@ fn tiles_of_any_size_on_any_threads_merge_to_the_whole() {
                 ),
             );
         }
-        let line = done(&folder, "merge 2.exr 0.exr 1.exr -o merged.exr");
+        let line = stdout(&done(&folder, "merge 2.exr 0.exr 1.exr -o merged.exr"));
         assert_eq!(line, "merged.exr: 0,0,16,12 0..12 of 12 spp\n");
         assert!(
             pixels(&folder, "merged.exr") == pixels(&folder, "whole.exr"),
@@ -301,11 +265,11 @@ fn what_does_not_fit_is_not_merged() {
         ("picture.png", &["picture.png", "PNG"]),
         ("missing.exr", &["missing.exr", "No such file"]),
     ] {
-        refused(&folder, &format!("merge a.exr {file} -o out.exr"), 3, words);
+        line_refused(&folder, &format!("merge a.exr {file} -o out.exr"), 3, words);
     }
-    refused(&folder, "merge -o out.exr", 2, &["EXR"]);
-    refused(&folder, "merge a.exr -o out.txt", 2, &[".png or .exr"]);
-    refused(&folder, "merge a.exr -o no/out.exr", 4, &["no folder"]);
+    line_refused(&folder, "merge -o out.exr", 2, &["EXR"]);
+    line_refused(&folder, "merge a.exr -o out.txt", 2, &[".png or .exr"]);
+    line_refused(&folder, "merge a.exr -o no/out.exr", 4, &["no folder"]);
 }
 
 #[test]
@@ -328,7 +292,7 @@ fn odd_options_are_refused_before_the_work() {
         ("--set film.speed=1", &["--set:1:6", "film.speed"]),
         ("--set mesh.0.file=no.obj", &["--set:1:13", "no.obj"]),
     ] {
-        refused(
+        line_refused(
             &folder,
             &format!("render scene.toml -o a.png {options}"),
             2,
@@ -340,7 +304,7 @@ fn odd_options_are_refused_before_the_work() {
         SCENE.replace("spp = 1", "crop = [0, 0, 8, 8]"),
     );
     let small = "render scene.toml -o a.png --size 7x7";
-    refused(&folder, small, 2, &["0,0,8,8", "7x7"]);
+    line_refused(&folder, small, 2, &["0,0,8,8", "7x7"]);
 }
 
 #[test]
@@ -348,7 +312,7 @@ fn resume_begins_ends_and_refuses() {
     let folder = folder();
     done(&folder, "render scene.toml -o a.exr --resume");
     let first = std::fs::read(folder.path("a.exr")).unwrap();
-    let line = done(&folder, "render scene.toml -o a.exr --resume");
+    let line = stdout(&done(&folder, "render scene.toml -o a.exr --resume"));
     assert_eq!(line, "a.exr is complete\n");
     for (options, words) in [
         ("--seed 1", &["seed", "found 0", "expected 1"][..]),
@@ -358,7 +322,7 @@ fn resume_begins_ends_and_refuses() {
         ("--clamp 3", &["clamp", "found off"]),
     ] {
         let words = [&["a.exr", "scene.toml"], words].concat();
-        refused(
+        line_refused(
             &folder,
             &format!("render scene.toml -o a.exr --resume {options}"),
             3,
@@ -371,7 +335,7 @@ fn resume_begins_ends_and_refuses() {
             .text("scene.toml")
             .replace("scale = 0.2", "scale = 0.3"),
     );
-    refused(
+    line_refused(
         &folder,
         "render scene.toml -o a.exr --resume",
         3,
@@ -379,7 +343,7 @@ fn resume_begins_ends_and_refuses() {
     );
     assert_eq!(std::fs::read(folder.path("a.exr")).unwrap(), first);
     folder.put("a.exr", &first[..first.len() / 3]);
-    refused(
+    line_refused(
         &folder,
         "render scene.toml -o a.exr --resume",
         3,
@@ -424,8 +388,8 @@ fn a_signal_ends_a_run_that_goes_on_to_the_same_bits() {
             "{message}"
         );
         assert_eq!(attributes(&folder, "a.exr")["partial"], "true");
-        refused(&folder, "merge a.exr -o b.exr", 3, &["a.exr", "partial"]);
-        refused(
+        line_refused(&folder, "merge a.exr -o b.exr", 3, &["a.exr", "partial"]);
+        line_refused(
             &folder,
             &format!("{render} a.exr --resume --seed 3"),
             3,

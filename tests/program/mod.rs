@@ -1,11 +1,12 @@
 //! Runs the program in a folder of its own.
 #![allow(dead_code)] // each test program uses its own part
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
-use prismarch::image::write_png_gray16;
+use prismarch::image::{ExrSamples, read_exr, write_png_gray16};
 use tempfile::TempDir;
 
 /// A square of two triangles, 2 by 2 around the origin in the plane z = 0, seen from +z.
@@ -35,6 +36,13 @@ scale = 0.2
 pub const FLAT: f64 = 0.2 * 32768.0 / 65535.0;
 
 pub struct Folder(TempDir);
+
+/// Exit code of wrong usage.
+pub const USAGE: i32 = 2;
+/// Exit code of bad input.
+pub const INPUT: i32 = 3;
+/// Exit code of an output that cannot be written.
+pub const OUTPUT: i32 = 4;
 
 impl Folder {
     /// An empty folder.
@@ -82,6 +90,14 @@ impl Folder {
             .collect();
         names.sort();
         names
+    }
+
+    /// What all files hold, by name; links are told by what they lead to.
+    pub fn contents(&self) -> BTreeMap<String, Option<Vec<u8>>> {
+        let names = self.names().into_iter();
+        names
+            .map(|name| (name.clone(), std::fs::read(self.path(&name)).ok()))
+            .collect()
     }
 
     /// Runs the program here.
@@ -133,6 +149,79 @@ impl Folder {
         let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
         child.wait_with_output().unwrap()
     }
+}
+
+/// The usual folder with one file replaced.
+pub fn with(name: &str, bytes: impl AsRef<[u8]>) -> Folder {
+    let folder = Folder::with_quad();
+    folder.put(name, bytes);
+    folder
+}
+
+/// The usual folder with a piece of the scene file replaced.
+pub fn with_scene(from: &str, to: &str) -> Folder {
+    assert!(SCENE.contains(from));
+    with("scene.toml", SCENE.replace(from, to))
+}
+
+/// Runs the program on a line of arguments; it must succeed.
+#[track_caller]
+pub fn done(folder: &Folder, arguments: &str) -> Output {
+    let arguments: Vec<&str> = arguments.split(' ').collect();
+    let output = folder.run(&arguments);
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        stderr(&output)
+    );
+    output
+}
+
+/// Runs the program and holds it to `code`, one error that has all of `words`, and unchanged files.
+#[track_caller]
+pub fn refused(folder: &Folder, arguments: &[&str], code: i32, words: &[&str]) {
+    let before = folder.contents();
+    let output = folder.run(arguments);
+    is_refusal(&output, code, words);
+    assert!(folder.contents() == before, "{arguments:?}: files changed");
+}
+
+/// The same of a line of arguments.
+#[track_caller]
+pub fn line_refused(folder: &Folder, arguments: &str, code: i32, words: &[&str]) {
+    let arguments: Vec<&str> = arguments.split(' ').collect();
+    refused(folder, &arguments, code, words);
+}
+
+/// One error with this exit code and all of `words`, before anything was rendered.
+#[track_caller]
+pub fn is_refusal(output: &Output, code: i32, words: &[&str]) {
+    let message = stderr(output);
+    assert_eq!(output.status.code(), Some(code), "{message}");
+    assert_eq!(
+        message.matches("prismarch: error: ").count(),
+        1,
+        "{message}"
+    );
+    assert!(!message.contains("rendering"), "{message}");
+    for word in words {
+        assert!(message.contains(word), "no {word:?} in: {message}");
+    }
+}
+
+/// Where the window of an EXR file begins, and the bits of every channel by name.
+pub type Pixels = ((i32, i32), BTreeMap<String, Vec<u32>>);
+
+pub fn pixels(folder: &Folder, name: &str) -> Pixels {
+    let picture = read_exr(&folder.path(name)).unwrap();
+    let channels = picture.channels.into_iter().map(|channel| {
+        let bits = match channel.samples {
+            ExrSamples::F32(s) => s.into_iter().map(f32::to_bits).collect(),
+            ExrSamples::U32(s) => s,
+        };
+        (channel.name, bits)
+    });
+    (picture.position, channels.collect())
 }
 
 pub fn stdout(output: &Output) -> String {
