@@ -27,7 +27,7 @@ pub enum WriteDemoError {
     },
     /// Files have the names of the demo's, and are not as a demo left them.
     #[error(
-        "{} not as prismarch demo left them: --force replaces them",
+        "{}: found what prismarch demo did not leave there; --force replaces it",
         list(files)
     )]
     Foreign {
@@ -41,8 +41,7 @@ pub enum WriteDemoError {
 
 fn list(files: &[PathBuf]) -> String {
     let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
-    let verb = if names.len() == 1 { "is" } else { "are" };
-    format!("{} {verb}", names.join(", "))
+    names.join(", ")
 }
 
 /// How a demo is written.
