@@ -19,8 +19,8 @@ use super::source::{Bytes, Input, Source};
 use super::{Format, ImageError};
 use crate::files::guard::guarded;
 
-/// Samples of a display window that are made whatever the data window has.
-const SMALL: usize = 1 << 24;
+/// Samples of a display window that are made whatever the data window has: three planes of them and their pixels are 48 MB.
+const SMALL: usize = 1 << 21;
 
 /// Samples of the display window per sample of the data window, beyond that.
 const SPARSEST: usize = 16;
