@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DVec2, DVec3};
 
+use super::curve::Corners;
 use super::simd::{LANES, Lanes, Quad};
 use crate::surface::{Corners as TriangleCorners, DisplacedSurface, DisplacementMap, Patch};
 
@@ -43,12 +44,6 @@ const LONG_TEXELS: f64 = 4096.0;
 
 /// In [`Cluster::prims`]: f32 does not tell the texels along a ray apart well.
 const LONG: u32 = 1 << 30;
-
-/// Corners and normals of one prism along three axes; lanes are the corners.
-pub struct Corners<Q> {
-    pub vertices: [Q; 3],
-    pub normals: [Q; 3],
-}
 
 /// Prisms in lanes: corners, normals and texture coordinates by corner and axis, and the range of w.
 pub struct PrismLanes<L> {

@@ -15,9 +15,41 @@
 
 use glam::DVec2;
 
-use super::cluster::Corners;
 use super::ray_frame::RayFrame;
 use super::simd::Quad;
+use crate::surface::Patch;
+
+/// Corners and normals of one prism along three axes; lanes are the corners.
+pub struct Corners<Q> {
+    pub vertices: [Q; 3],
+    pub normals: [Q; 3],
+}
+
+impl<Q: Quad> Corners<Q> {
+    /// Those over a patch, in the order of `axes`.
+    #[inline(always)]
+    pub fn new(patch: &Patch<'_>, [x, y, z]: [usize; 3]) -> Self {
+        let ([v0, v1, v2], [n0, n1, n2]) = (patch.vertices, patch.normals);
+        Self {
+            vertices: [
+                across([v0[x], v1[x], v2[x]]),
+                across([v0[y], v1[y], v2[y]]),
+                across([v0[z], v1[z], v2[z]]),
+            ],
+            normals: [
+                across([n0[x], n1[x], n2[x]]),
+                across([n0[y], n1[y], n2[y]]),
+                across([n0[z], n1[z], n2[z]]),
+            ],
+        }
+    }
+}
+
+/// Three lanes, and the first once more.
+#[inline(always)]
+fn across<Q: Quad>([a, b, c]: [f64; 3]) -> Q {
+    Q::from_array([a, b, c, a])
+}
 
 /// One prism seen along one ray; lanes are vertices, or the sides opposite them.
 pub struct View<Q> {

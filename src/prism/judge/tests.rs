@@ -1,0 +1,280 @@
+//! The judge against the march, against itself cell by cell, and against points of its curves taken one by one.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3, Vec2, Vec3, vec3};
+
+use super::*;
+use crate::prism::march::exact::{Problem, search};
+use crate::prism::ray_frame::axes;
+use crate::prism::simd::{Portable, SimdLevel};
+use crate::prism::{March, Parts, Prisms};
+use crate::ray::Ray;
+use crate::surface::{
+    DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Texels, Wrap,
+};
+
+struct Random(u64);
+
+impl Random {
+    /// In [0, 1).
+    fn next(&mut self) -> f32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1 << 24) as f32
+    }
+
+    fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.next()
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        ((self.next() * n as f32) as usize).min(n - 1)
+    }
+
+    fn signed(&mut self) -> Vec3 {
+        vec3(self.next(), self.next(), self.next()) * 2.0 - 1.0
+    }
+
+    fn map(&mut self) -> DisplacementMap {
+        let (width, height) = (1 + self.below(24), 1 + self.below(24));
+        let count = width * height;
+        let texels = match self.below(3) {
+            0 => Texels::U8((0..count).map(|_| (self.next() * 255.0) as u8).collect()),
+            1 => Texels::U16((0..count).map(|_| (self.next() * 65535.0) as u16).collect()),
+            _ => Texels::F32((0..count).map(|_| self.between(-0.5, 1.5)).collect()),
+        };
+        let wrap = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror][self.below(3)];
+        DisplacementMap::new(width, height, texels, wrap).unwrap()
+    }
+
+    /// One triangle: bent, folded, flat, a sliver; with a fraction of a map to a few.
+    fn surface(&mut self) -> Arc<DisplacedSurface> {
+        let tilt = [0.0, 0.05, 0.3, 1.0, 3.0][self.below(5)];
+        let width = [1.0, 1.0, 0.3, 1e-3][self.below(4)];
+        let positions = [
+            Vec3::ZERO,
+            vec3(1.0, 0.0, 0.0),
+            vec3(self.between(-0.2, 1.2), width, 0.0),
+        ];
+        let normals = [(); 3].map(|()| (Vec3::Z + tilt * self.signed()).normalize());
+        let mut repeats = [0.1, 1.0, 3.0][self.below(3)];
+        let mut texcoord = |p: Vec3| p.truncate() * repeats;
+        let texcoords = if self.below(3) == 0 {
+            [(); 3].map(|()| repeats * Vec2::new(self.next() * 4.0 - 2.0, self.next()))
+        } else {
+            positions.map(&mut texcoord)
+        };
+        repeats = self.between(0.02, 0.5) * if tilt > 2.0 { 4.0 } else { 1.0 };
+        let scale = if self.below(4) == 0 {
+            -repeats
+        } else {
+            repeats
+        };
+        let builder = MeshBuilder {
+            positions: positions.to_vec(),
+            normals: normals.to_vec(),
+            texcoords: texcoords.to_vec(),
+            triangles: vec![[0, 1, 2]],
+        };
+        let (mesh, _) = builder.build(NormalMode::File).unwrap();
+        let displacement = Displacement {
+            midlevel: self.between(0.0, 1.0) * self.below(2) as f32,
+            ..Displacement::new(scale)
+        };
+        let map = self.map();
+        Arc::new(DisplacedSurface::new(Arc::new(mesh), Arc::new(map), displacement).unwrap())
+    }
+
+    /// From anywhere; through a vertex, along a texel line, in the plane of an offset triangle.
+    fn ray(&mut self, surface: &DisplacedSurface) -> Ray {
+        let patch = surface.patch(0);
+        let at = |b: Vec3, w: f32| {
+            let [u, v, w] = [b.y, b.z, w].map(f64::from);
+            (patch.base(u, v) + w * patch.normal(u, v)).as_vec3()
+        };
+        let mut inside = || {
+            let (a, b) = (self.next(), self.next());
+            let (u, v) = if a + b > 1.0 {
+                (1.0 - a, 1.0 - b)
+            } else {
+                (a, b)
+            };
+            vec3(1.0 - u - v, u, v)
+        };
+        let (b, c) = (inside(), inside());
+        let [low, high] = patch.range().map(|d| d as f32);
+        let w = self.between(low, high);
+        let (to, direction) = match self.below(6) {
+            0 => (
+                at([Vec3::X, Vec3::Y, Vec3::Z][self.below(3)], w),
+                self.signed(),
+            ),
+            1 => (at(b, w), at(c, w) - at(b, w)),
+            2 => (at(b, w), Vec3::X),
+            3 => {
+                // From a point on a texel line to another.
+                let [p, q] = [b, c].map(|b| patch.texel(b.y.into(), b.z.into()));
+                let p = DVec2::new(p.x.round(), p.y);
+                let q = DVec2::new(p.x, q.y);
+                let [p, q] = [p, q].map(|p| barycentric(&patch.texels, p));
+                let up = self.between(-0.1, 0.1) * self.below(2) as f32;
+                (at(p, w), at(q, w + up) - at(p, w))
+            }
+            4 => (at(b, w), vec3(0.0, 0.0, -1.0)),
+            _ => (at(b, w), self.signed()),
+        };
+        let direction = if direction.length() > 1e-6 && direction.is_finite() {
+            direction
+        } else {
+            Vec3::Y
+        };
+        let from = to - self.between(0.0, 4.0) * direction;
+        let from = if from.is_finite() { from } else { Vec3::ZERO };
+        let mut ray = Ray::new(from, direction);
+        if self.below(3) == 0 {
+            ray.tnear = self.between(0.0, 4.0);
+            ray.tfar = ray.tnear + self.between(0.0, 2.0);
+        }
+        ray
+    }
+}
+
+/// (b0, b1, b2) of a point among three.
+fn barycentric([a, b, c]: &[DVec2; 3], p: DVec2) -> Vec3 {
+    let area = (b - a).perp_dot(c - a);
+    let (u, v) = (
+        (p - a).perp_dot(c - a) / area,
+        (b - a).perp_dot(p - a) / area,
+    );
+    DVec3::new(1.0 - u - v, u, v).as_vec3()
+}
+
+/// A surface of one triangle with the march's prism over it.
+struct Case {
+    prisms: Prisms,
+}
+
+impl Case {
+    fn new(surface: Arc<DisplacedSurface>) -> Self {
+        Self {
+            prisms: Prisms::new(surface, March::Exact).unwrap(),
+        }
+    }
+
+    fn ask<T>(&self, ray: &Ray, answer: impl FnOnce(&Question<'_>) -> T) -> T {
+        let Parts::Exact(exact) = &self.prisms.parts else {
+            panic!("another march");
+        };
+        let patch = self.prisms.surface.patch(0);
+        let frame = RayFrame::new(ray, axes(ray));
+        answer(&Question {
+            patch: &patch,
+            range: exact.clusters[0].offsets(0).map(f64::from),
+            frame: &frame,
+            interval: [ray.tnear, ray.tfar],
+            any: false,
+        })
+    }
+
+    /// What the march finds.
+    fn march(&self, ray: &Ray) -> Option<f64> {
+        let Parts::Exact(exact) = &self.prisms.parts else {
+            panic!("another march");
+        };
+        let problem = Problem {
+            surface: &self.prisms.surface,
+            cluster: &exact.clusters[0],
+            lane: 0,
+            any: false,
+            interval: [ray.tnear, ray.tfar],
+            spread: 0.0,
+        };
+        let frame = RayFrame::new(ray, axes(ray));
+        search::<Portable>(&problem, &frame).map(|found| found.t)
+    }
+}
+
+/// All cells of a triangle, each alone.
+fn cells(patch: &Patch<'_>) -> Vec<Cells> {
+    let [a, b, c] = patch.texels;
+    let (low, high) = (a.min(b).min(c).floor() - 1.0, a.max(b).max(c).floor() + 1.0);
+    let (low, high) = (low.as_i64vec2(), high.as_i64vec2());
+    (low.y..=high.y)
+        .flat_map(|j| {
+            (low.x..=high.x).map(move |i| Cells {
+                x: [i; 2],
+                y: [j; 2],
+            })
+        })
+        .collect()
+}
+
+fn nearest(found: impl Iterator<Item = Found>) -> Option<Found> {
+    found.min_by(|a, b| a.t.total_cmp(&b.t))
+}
+
+#[test]
+fn all_cells_together_are_the_triangle() {
+    let mut random = Random(1);
+    let mut hits = 0;
+    for _ in 0..300 {
+        let case = Case::new(random.surface());
+        for _ in 0..30 {
+            let ray = random.ray(&case.prisms.surface);
+            case.ask(&ray, |question| {
+                let whole = within::<Portable>(question, &Cells::ALL);
+                let all = cells(question.patch);
+                let each: Vec<Found> = all
+                    .iter()
+                    .filter_map(|c| within::<Portable>(question, c))
+                    .collect();
+                assert_eq!(nearest(each.iter().copied()), whole, "{ray:?}");
+                hits += usize::from(whole.is_some());
+                // In strips of rectangles the same.
+                let [low, high] = [all[0], all[all.len() - 1]];
+                let strips = (low.x[0]..=high.x[0]).step_by(7).map(|i| Cells {
+                    x: [i, i + 6],
+                    y: [low.y[0], high.y[0]],
+                });
+                let strips = strips.filter_map(|c| within::<Portable>(question, &c));
+                assert_eq!(nearest(strips), whole, "{ray:?}");
+                let any = Question {
+                    any: true,
+                    ..*question
+                };
+                let any = within::<Portable>(&any, &Cells::ALL);
+                assert_eq!(any.is_some(), whole.is_some(), "{ray:?}");
+            });
+        }
+    }
+    assert!(hits > 2000, "{hits}");
+}
+
+#[test]
+fn the_march_finds_the_same() {
+    let mut random = Random(2);
+    let (mut hits, mut others) = (0, 0);
+    for k in 0..2000 {
+        let case = Case::new(random.surface());
+        for _ in 0..20 {
+            let ray = random.ray(&case.prisms.surface);
+            let found = case.ask(&ray, |q| within::<Portable>(q, &Cells::ALL).map(|f| f.t));
+            let march = case.march(&ray);
+            hits += usize::from(found.is_some());
+            let same = match (found, march) {
+                (Some(a), Some(b)) => (a - b).abs() <= 1e-6 * a.abs().max(1.0),
+                (None, None) => true,
+                _ => false,
+            };
+            if !same {
+                others += 1;
+                println!("{k} {found:?} {march:?} {ray:?}");
+            }
+        }
+    }
+    println!("{hits} hits, {others} others");
+    assert!(hits > 8000 && others == 0, "{hits} {others}");
+}
