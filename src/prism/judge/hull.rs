@@ -85,6 +85,37 @@ impl<Q: Quad> Hull<Q> {
         [low - slack, high + slack]
     }
 
+    /// Whether the part is so nearly straight, and N' so nearly constant, that g is as good as a parabola along it, if it is within one
+    /// cell: of one turning point at most.
+    #[inline(always)]
+    pub fn is_straight(&self, patch: &Patch<'_>) -> bool {
+        /// Of the middle control point from between the two others: texels, and parts of N'.
+        const BEND: f64 = 1.0 / 64.0;
+        /// From one end to the other: parts of N' and of A.
+        const CHANGE: f64 = 0.25;
+        let [p, q, r] = self.places;
+        let half = Q::splat(0.5);
+        let [x, y, u, v] = (q - half * (p + r)).to_array();
+        let [_, _, du, dv] = (r - p).to_array();
+        let [.., u1, v1] = q.to_array();
+        let (n1, n2) = (
+            patch.normals[1] - patch.normals[0],
+            patch.normals[2] - patch.normals[0],
+        );
+        let squared = (patch.normals[0] + u1 * n1 + v1 * n2).length_squared();
+        let bend = (u * n1 + v * n2).length_squared();
+        let turn = (du * n1 + dv * n2).length_squared();
+        let [a, b, c] = [
+            self.depths[0].to_array()[0],
+            self.depths[1].to_array()[0],
+            self.depths[2].to_array()[0],
+        ];
+        x.abs().max(y.abs()) <= BEND
+            && bend <= BEND * BEND * squared
+            && turn <= CHANGE * CHANGE * squared
+            && (c - a).abs() <= CHANGE * b
+    }
+
     /// Whether all of the part is surely above the surface, or all below, for the heights that it has in the part's texels.
     #[inline(always)]
     pub fn is_clear_of(&self, patch: &Patch<'_>, (low, high): (f32, f32)) -> bool {

@@ -29,6 +29,7 @@ use super::simd::{Lanes, Quad, Task};
 use crate::surface::Patch;
 use pieces::Piece;
 use search::{Along, Search};
+#[allow(unused_imports)] // the march goes over to it
 pub use walls::walls;
 
 /// What is asked about one base triangle.

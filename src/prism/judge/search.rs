@@ -126,6 +126,13 @@ impl<'a> Search<'a> {
         Fate::Short([[first.x, last.x], [first.y, last.y]])
     }
 
+    /// Counts something looked at; ends the search where there was too much.
+    #[inline(always)]
+    fn count(&mut self) {
+        self.patience = self.patience.saturating_sub(1);
+        self.done |= self.patience == 0;
+    }
+
     /// Halves a curve until its parts are short.
     #[inline(always)]
     fn walk<Q: Quad>(&mut self, curve: &Curve<Q>) {
@@ -133,8 +140,7 @@ impl<'a> Search<'a> {
         let mut ahead = [1.0; DEPTH + 2];
         let (mut count, mut from, mut judged) = (1, 0.0, 0.0);
         while count > 0 {
-            self.patience = self.patience.saturating_sub(1);
-            self.done |= self.patience == 0;
+            self.count();
             let to = ahead[count - 1];
             match self.look(curve, [from, to]) {
                 Fate::Long if count <= DEPTH => {
@@ -183,14 +189,39 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// A part within one cell, where g has one turning point at most.
+    /// A part within one cell: straight piece by straight piece, in each of which g has one turning point at most.
     #[inline(always)]
-    fn part<Q: Quad>(&mut self, curve: &Curve<Q>, [from, to]: [f64; 2]) {
+    fn part<Q: Quad>(&mut self, curve: &Curve<Q>, [mut from, to]: [f64; 2]) {
+        /// Halvings at most: of a curve around a point where opposed normals cancel there is no end.
+        const DEPTH: usize = 12;
         let patch = self.question.patch;
-        let (start, end) = (height(patch, curve, from).g, height(patch, curve, to).g);
-        let above = start > 0.0;
-        if above != (end > 0.0) {
-            let guess = from + (to - from) * (start / (start - end));
+        let mut ahead = [to; DEPTH + 1];
+        let mut count = 1;
+        let mut before = height(patch, curve, from).g;
+        while count > 0 && !self.done {
+            self.count();
+            let end = ahead[count - 1];
+            let is_straight =
+                || Hull::new(curve, [from, end]).is_some_and(|hull| hull.is_straight(patch));
+            if count <= DEPTH && !is_straight() {
+                ahead[count] = 0.5 * (from + end);
+                count += 1;
+                continue;
+            }
+            let behind = height(patch, curve, end).g;
+            self.straight(curve, [from, end], [before, behind]);
+            (from, before) = (end, behind);
+            count -= 1;
+        }
+    }
+
+    /// A piece between two values of g.
+    #[inline(always)]
+    fn straight<Q: Quad>(&mut self, curve: &Curve<Q>, [from, to]: [f64; 2], g: [f64; 2]) {
+        let patch = self.question.patch;
+        let above = g[0] > 0.0;
+        if above != (g[1] > 0.0) {
+            let guess = from + (to - from) * (g[0] / (g[0] - g[1]));
             self.take(crossing(patch, curve, [from, to], guess, above));
         } else if let Some(dip) = dip(patch, curve, [from, to], above) {
             self.take(crossing(patch, curve, [from, dip], dip, above));
