@@ -263,13 +263,13 @@ fn beside(patch: &Patch<'_>, ray: &Ray, found: &Found) -> f64 {
     patch.point(found.u, found.v).position.distance(at)
 }
 
-/// What the march misses is there.
+/// What only one of them finds is there.
 #[test]
 fn the_march_finds_the_same() {
+    /// World units: what f64 leaves of places where the ray is edge-on.
+    const NEAR: f64 = 1e-5;
     let mut random = Random(2);
-    /// What single precision sees of where a ray is edge-on.
-    const NEAR: f64 = 1e-7;
-    let (mut hits, mut others, mut bad) = (0, 0, 0);
+    let (mut hits, mut others) = (0, 0);
     for _ in 0..2000 {
         let case = Case::new(random.surface());
         let patch = case.prisms.surface.patch(0);
@@ -283,24 +283,20 @@ fn the_march_finds_the_same() {
             let march = case.march(&ray);
             hits += usize::from(found.is_some());
             let is_same = match (found, march) {
-                (Some(a), Some(b)) => (a.t - b.t).abs() <= 1e-6 * a.t.abs().max(1.0),
+                (Some(a), Some(b)) => (a.t - b.t).abs() * f64::from(ray.direction.length()) < NEAR,
                 (a, b) => a.is_some() == b.is_some(),
             };
             if !is_same {
+                // The march looks for pairs of crossings in one cell less closely.
                 others += 1;
-                let off = |found: Option<Found>| found.map(|f| beside(&patch, &ray, &f));
-                let (here, there) = (off(found), off(march));
-                let is_missed = here.is_some_and(|off| off < NEAR)
-                    && march.is_none_or(|m| found.is_some_and(|f| f.t < m.t));
-                let is_none = there.is_some_and(|off| off > NEAR);
-                if !(is_missed || is_none) {
-                    let near = march.and_then(|m| { let mut r=ray; r.tnear=(m.t-1e-6*m.t) as f32; r.tfar=(m.t+1e-6*m.t) as f32; case.ask(&r, |q| within::<Portable>(q, &Cells::ALL))});
-                    bad += 1; println!("{found:?} {march:?} {here:?} {there:?} near {near:?} {ray:?} {patch:?}");
-                }
+                let is_missed = found.is_some_and(|found| {
+                    beside(&patch, &ray, &found) < 1e-7 && march.is_none_or(|m| found.t < m.t)
+                });
+                assert!(is_missed, "{found:?} {march:?} {ray:?}");
             }
         }
     }
-    println!("march {hits} {others} {bad}"); assert!(hits > 8000 && others < 10 && bad == 0, "{hits} {others}");
+    assert!(hits > 8000 && others < 10, "{hits} {others}");
 }
 
 /// The height above S at points of the ray, by the exact inverse.
