@@ -5,13 +5,13 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Vec2, Vec3, vec3};
 
 use super::*;
-use crate::prism::march::exact::{Problem, search};
+use crate::prism::march::exact::{self, Problem, search};
 use crate::prism::ray_frame::axes;
 use crate::prism::simd::{Portable, SimdLevel};
 use crate::prism::{March, Parts, Prisms};
 use crate::ray::Ray;
 use crate::surface::{
-    DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Texels, Wrap,
+    DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Seams, Texels, Wrap,
 };
 
 struct Random(u64);
@@ -165,35 +165,39 @@ impl Case {
     }
 
     fn ask<T>(&self, ray: &Ray, answer: impl FnOnce(&Question<'_>) -> T) -> T {
-        let Parts::Exact(exact) = &self.prisms.parts else {
+        let Parts::Exact(parts) = &self.prisms.parts else {
             panic!("another march");
         };
         let patch = self.prisms.surface.patch(0);
         let frame = RayFrame::new(ray, axes(ray));
         answer(&Question {
             patch: &patch,
-            range: exact.clusters[0].offsets(0).map(f64::from),
+            range: parts.clusters[0].offsets(0).map(f64::from),
             frame: &frame,
             interval: [ray.tnear, ray.tfar],
             any: false,
         })
     }
 
-    /// What the march finds.
-    fn march(&self, ray: &Ray) -> Option<Found> {
-        let Parts::Exact(exact) = &self.prisms.parts else {
+    fn ask_march<T>(&self, ray: &Ray, answer: impl FnOnce(&Problem<'_>, &RayFrame) -> T) -> T {
+        let Parts::Exact(parts) = &self.prisms.parts else {
             panic!("another march");
         };
         let problem = Problem {
             surface: &self.prisms.surface,
-            cluster: &exact.clusters[0],
+            cluster: &parts.clusters[0],
             lane: 0,
             any: false,
             interval: [ray.tnear, ray.tfar],
             spread: 0.0,
         };
-        let frame = RayFrame::new(ray, axes(ray));
-        search::<Portable>(&problem, &frame).map(|found| Found {
+        answer(&problem, &RayFrame::new(ray, axes(ray)))
+    }
+
+    /// What the march finds.
+    fn march(&self, ray: &Ray) -> Option<Found> {
+        let found = self.ask_march(ray, search::<Portable>)?;
+        Some(Found {
             t: found.t,
             u: found.u,
             v: found.v,
@@ -297,6 +301,28 @@ fn the_march_finds_the_same() {
         }
     }
     assert!(hits > 8000 && others < 10, "{hits} {others}");
+}
+
+#[test]
+fn walls_are_where_the_march_has_them() {
+    let mut random = Random(9);
+    let mut hits = 0;
+    for _ in 0..300 {
+        let open = DisplacedSurface::clone(&random.surface());
+        let case = Case::new(Arc::new(open.with_seams(Seams::Closed)));
+        let surface = &case.prisms.surface;
+        for _ in 0..20 {
+            let ray = random.ray(surface);
+            let found = case.ask(&ray, |q| walls::<Portable>(q, surface, 0, 0b111));
+            assert_eq!(
+                found,
+                case.ask_march(&ray, exact::walls::<Portable>),
+                "{ray:?}"
+            );
+            hits += usize::from(found.is_some());
+        }
+    }
+    assert!(hits > 1000, "{hits}");
 }
 
 /// The height above S at points of the ray, by the exact inverse.
@@ -504,6 +530,7 @@ fn times() {
                 (RayFrame::new(&ray, axes(&ray)), cell)
             })
             .collect();
+        let range = patch.range();
         let time = |cells: &dyn Fn(&Cells) -> Cells| {
             let start = std::time::Instant::now();
             let mut hits = 0;
@@ -511,7 +538,7 @@ fn times() {
                 for (frame, cell) in &rays {
                     let question = Question {
                         patch: &patch,
-                        range: patch.range(),
+                        range,
                         frame,
                         interval: [0.0, f32::INFINITY],
                         any: false,
