@@ -4,11 +4,7 @@
 //! any: nothing of it knows of time. Making them takes about a microsecond per ray and cluster.
 //!
 //! **Bounds.** A backend that knows motion, as Embree, has a box per primitive and time step and takes the linear interpolation of both
-//! boxes of a segment at the times between. That holds the surface: a coordinate of S is P_a + D N_a. P_a(t) lies between the
-//! linear interpolations of the least and the largest v_a, since v_i(t) is linear. N(b, t) is the unit vector along a positive
-//! combination of the six vertex normals at both ends of the segment, because n_i(t) is one of n_i's two; so D N_a lies in one interval
-//! for all times of the segment ([`along_axis`]). Each step's box is that of the corners then, grown by the union of the intervals
-//! of the segments it ends: the same interval, or a larger one, is added at both ends.
+//! boxes of a segment at the times between. [`MovingSurface::block_bounds`] makes boxes that hold the surface then.
 
 use std::sync::Arc;
 
@@ -17,7 +13,7 @@ use glam::Vec3;
 use super::simd::LANES;
 use super::{BoundsChange, Lod, March, MarchError, Parts, PrismHit, PrismOptions, Prisms};
 use crate::ray::{Aabb, Ray};
-use crate::surface::{ClosestPoint, MovingSurface, PointQuery, TexelRect};
+use crate::surface::{ClosestPoint, MovingSurface, PointQuery, TexelBox, TexelRect};
 
 /// A [`MovingSurface`] as a set of prisms, for rays at any time from 0 to 1 ([`Ray::time`]).
 ///
@@ -119,16 +115,16 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.bounds(primitive);
         }
-        let bounds = self
-            .lanes(primitive)
-            .fold(Aabb::EMPTY, |bounds, (prim, range)| {
-                bounds.union(self.prism_bounds(prim, range, step))
-            });
+        let prisms = self.lanes(primitive).filter_map(|(prim, range)| {
+            let whole = TexelBox::EVERYWHERE;
+            self.moving.block_bounds(prim, &whole, range, step)
+        });
+        let bounds = prisms.fold(Aabb::EMPTY, Aabb::union);
         bounds.padded(super::BOUNDS_ULPS)
     }
 
     /// The base triangles of a primitive, and a range that holds D on each.
-    fn lanes(&self, primitive: u32) -> impl Iterator<Item = (u32, [f32; 2])> {
+    fn lanes(&self, primitive: u32) -> impl Iterator<Item = (u32, [f64; 2])> {
         let index = primitive as usize;
         let exact = match &self.prisms.parts {
             Parts::Exact(exact) => Some(exact),
@@ -139,30 +135,9 @@ impl MovingPrisms {
             (0..exact.len(index)).map(|lane| {
                 let prim = cluster.prim(lane);
                 let patch = self.prisms.surface.patch(prim);
-                let [low, high] = patch.displacements_of(cluster.offsets(lane));
-                (prim, [(low as f32).next_down(), (high as f32).next_up()])
+                (prim, patch.displacements_of(cluster.offsets(lane)))
             })
         })
-    }
-
-    fn prism_bounds(&self, prim: u32, range: [f32; 2], step: usize) -> Aabb {
-        let last = self.time_steps() - 1;
-        let segments = step.saturating_sub(1)..(step + 1).min(last);
-        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for segment in segments {
-            let normals = [segment, segment + 1].map(|step| self.moving.corners_of(step, prim).1);
-            for axis in 0..3 {
-                let [a, b] = along_axis(normals.as_flattened(), axis, range);
-                low[axis] = low[axis].min(a);
-                high[axis] = high[axis].max(b);
-            }
-        }
-        let corners = self.moving.corners_of(step, prim).0;
-        let around = corners.into_iter().fold(Aabb::EMPTY, Aabb::including);
-        Aabb {
-            min: around.min + low,
-            max: around.max + high,
-        }
     }
 
     /// The first intersection of `ray`, at its time, with what one traced primitive holds of the surface, with t in (tnear, tfar).
@@ -232,43 +207,4 @@ fn may_pass(corners: [Vec3; 3], reach: f32, ray: &Ray) -> bool {
     let slack = SLACK * (enter.abs() + leave.abs());
     // Not what may be NaN: of a ray that starts on a face.
     !(enter > leave + slack || enter > tfar + slack || leave < tnear - slack)
-}
-
-/// Where D N_a may lie for a coordinate a, D in `range` and N a unit vector along any positive combination m = sum c_j n_j, sum c_j = 1, of
-/// unit vectors. m_a lies between the least and the largest n_j,a; N_a = m_a/|m| has its sign, and 1/|m| is at most
-/// (1 - spread/2)^(-1/2), for |m|^2 = 1 - sum_{j<k} c_j c_k |n_j - n_k|^2 and the sum of the c_j c_k is below 1/2.
-fn along_axis(normals: &[Vec3], axis: usize, range: [f32; 2]) -> [f32; 2] {
-    let mut spread: f32 = 0.0;
-    for (k, a) in normals.iter().enumerate() {
-        for b in &normals[k + 1..] {
-            spread = spread.max(a.distance_squared(*b));
-        }
-    }
-    let shortest = (1.0 - 0.5 * spread).max(0.0).sqrt();
-    // Of rounding, the normals' own length and the spread's.
-    const SLACK: f32 = 1e-5;
-    let longer = |x: f32| {
-        if shortest < 1e-2 {
-            x.signum()
-        } else {
-            (x / shortest * (1.0 + SLACK)).clamp(-1.0, 1.0)
-        }
-    };
-    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-    for n in normals {
-        (low, high) = (low.min(n[axis]), high.max(n[axis]));
-    }
-    let (low, high) = (low - SLACK, high + SLACK);
-    let ends = [low.min(longer(low)), high.max(longer(high))];
-    let products = [
-        range[0] * ends[0],
-        range[0] * ends[1],
-        range[1] * ends[0],
-        range[1] * ends[1],
-    ];
-    products
-        .into_iter()
-        .fold([f32::INFINITY, f32::NEG_INFINITY], |[a, b], x| {
-            [a.min(x), b.max(x)]
-        })
 }

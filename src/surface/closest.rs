@@ -24,7 +24,8 @@ use std::collections::BinaryHeap;
 
 use glam::{Affine3A, DVec2, Vec3};
 
-use super::{DisplacedSurface, Patch};
+use super::block::Polygon;
+use super::{DisplacedSurface, Patch, TexelBox};
 use bounds::{Part, Placed};
 
 /// The nearest point of a displaced surface.
@@ -125,7 +126,22 @@ struct Search<'s> {
     best: Option<(usize, DVec2)>,
 }
 
-impl Search<'_> {
+impl<'s> Search<'s> {
+    /// Starts with what of a triangle's piece of S is in a block.
+    fn start(&mut self, prim: u32, patch: Patch<'s>, block: &TexelBox, query: &PointQuery) {
+        let polygon = Polygon::of(&patch, block);
+        if polygon.is_empty() {
+            return;
+        }
+        let Some(placed) = Placed::new(patch, prim, &polygon, query) else {
+            return;
+        };
+        self.placed.push(placed);
+        for corners in polygon.triangles() {
+            self.add(self.placed.len() - 1, Part::coarse(corners), 0.0, 0);
+        }
+    }
+
     /// Whether nothing of a triangle that is not nearer than this is of interest.
     fn is_lost(&self, placed: usize, below: f64) -> bool {
         below >= self.distance * (1.0 - RELATIVE) - OF_SIZE * self.placed[placed].size
@@ -153,9 +169,6 @@ impl Search<'_> {
     }
 
     fn run(&mut self) {
-        for placed in 0..self.placed.len() {
-            self.add(placed, Part::WHOLE, 0.0, 0);
-        }
         let mut pieces = Vec::new();
         for _ in 0..MOST_PARTS {
             let Some(Candidate {
@@ -221,25 +234,37 @@ impl DisplacedSurface {
         query: &PointQuery,
     ) -> Option<ClosestPoint> {
         let prims = prims.into_iter();
-        closest(prims.map(|prim| (prim, self.patch(prim))), query)
+        self.closest_in(prims.map(|prim| (prim, TexelBox::EVERYWHERE)), query)
+    }
+
+    /// The same over blocks: what of each of these base triangles is in its rectangle of texel coordinates.
+    pub(crate) fn closest_in(
+        &self,
+        blocks: impl IntoIterator<Item = (u32, TexelBox)>,
+        query: &PointQuery,
+    ) -> Option<ClosestPoint> {
+        closest(blocks, |prim| self.patch(prim), query)
     }
 }
 
-/// The same for given pieces of S and their triangles.
+/// The same for given pieces of S by triangle.
 pub(super) fn closest<'m>(
-    patches: impl Iterator<Item = (u32, Patch<'m>)>,
+    blocks: impl IntoIterator<Item = (u32, TexelBox)>,
+    patch: impl Fn(u32) -> Patch<'m>,
     query: &PointQuery,
 ) -> Option<ClosestPoint> {
     if !query.is_valid() {
         return None;
     }
-    let placed = patches.filter_map(|(prim, patch)| Placed::new(patch, prim, query));
     let mut search = Search {
-        placed: placed.collect(),
+        placed: Vec::new(),
         heap: BinaryHeap::new(),
         distance: query.radius.into(),
         best: None,
     };
+    for (prim, block) in blocks {
+        search.start(prim, patch(prim), &block, query);
+    }
     search.run();
     let (placed, place) = search.best?;
     let placed = &search.placed[placed];

@@ -10,6 +10,7 @@
 //!
 //! This room knows no prism, no Embree, no picture and no thread pool.
 
+mod block;
 mod closest;
 mod displaced;
 mod edit;
@@ -30,6 +31,7 @@ pub(crate) mod smooth_normal;
 mod texels;
 mod uv;
 
+pub(crate) use block::TexelBox;
 pub use closest::{ClosestPoint, PointQuery};
 pub use displaced::{DisplacedSurface, Displacement, SurfaceError, SurfacePoint};
 pub use edit::{TexelRect, Update};

@@ -16,7 +16,7 @@ use thiserror::Error;
 use super::mesh::has_area;
 use super::{
     ClosestPoint, DisplacedSurface, InterpolateError, Interpolated, Patch, PointQuery, Seams,
-    normals,
+    TexelBox, normals,
 };
 use crate::ray::{MAX_COORDINATE, time_within};
 
@@ -235,11 +235,17 @@ impl MovingSurface {
         prims: impl IntoIterator<Item = u32>,
         query: &PointQuery,
     ) -> Option<ClosestPoint> {
-        let patches = prims.into_iter();
-        super::closest::closest(
-            patches.map(|prim| (prim, self.patch(prim, query.time))),
-            query,
-        )
+        let prims = prims.into_iter();
+        self.closest_in(prims.map(|prim| (prim, TexelBox::EVERYWHERE)), query)
+    }
+
+    /// [`DisplacedSurface::closest_in`] at the query's time.
+    pub(crate) fn closest_in(
+        &self,
+        blocks: impl IntoIterator<Item = (u32, TexelBox)>,
+        query: &PointQuery,
+    ) -> Option<ClosestPoint> {
+        super::closest::closest(blocks, |prim| self.patch(prim, query.time), query)
     }
 }
 

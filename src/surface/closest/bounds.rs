@@ -4,6 +4,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::PointQuery;
 use crate::surface::Patch;
+use crate::surface::block::{Polygon, TexelBox};
 
 /// A part of the barycentric triangle.
 #[derive(Clone, Copy)]
@@ -38,11 +39,11 @@ impl Cell {
 const TWO_OVER_ROOT_THREE: f64 = 1.154_700_6;
 
 impl Part {
-    /// All of the triangle.
-    pub const WHOLE: Self = Self {
-        corners: [DVec2::ZERO, DVec2::X, DVec2::Y],
-        cell: None,
-    };
+    /// A triangle of (u, v), of any number of texels.
+    pub fn coarse(corners: [DVec2; 3]) -> Self {
+        let cell = None;
+        Self { corners, cell }
+    }
 }
 
 /// How near S may come over a part.
@@ -62,7 +63,7 @@ pub struct Placed<'m> {
     normals: [DVec3; 3],
     /// The transform makes no vector longer by more.
     stretch: f64,
-    /// The longest edge and the largest |D|.
+    /// The longest edge of the triangle and the largest |D| of what is looked at.
     pub size: f64,
 }
 
@@ -81,8 +82,8 @@ fn largest(x: [f64; 3]) -> f64 {
 }
 
 impl<'m> Placed<'m> {
-    /// `None` where the texture coordinates are no finite numbers.
-    pub fn new(patch: Patch<'m>, prim: u32, query: &PointQuery) -> Option<Self> {
+    /// With what of it is looked at. `None` where the texture coordinates are no finite numbers.
+    pub fn new(patch: Patch<'m>, prim: u32, polygon: &Polygon, query: &PointQuery) -> Option<Self> {
         let to_world = DAffine3 {
             matrix3: DMat3::from_cols_array(&query.to_world.matrix3.to_cols_array().map(f64::from)),
             translation: query.to_world.translation.as_dvec3() - query.point.as_dvec3(),
@@ -93,9 +94,8 @@ impl<'m> Placed<'m> {
         let square = to_world.matrix3.transpose() * to_world.matrix3;
         let rows = [square.x_axis, square.y_axis, square.z_axis].map(|row| row.abs().element_sum());
         let stretch = largest(rows).sqrt();
-        let [a, b, c] = patch.texels;
-        let heights = patch.map.range_in_box(a.min(b).min(c), a.max(b).max(c));
-        let [low, high] = patch.displacements(heights);
+        let [first, last] = polygon.texels();
+        let [low, high] = patch.displacements(patch.map.range_in_box(first, last));
         let size = over_edges(vertices, DVec3::distance) + stretch * low.abs().max(high.abs());
         let texels = patch.texels.iter().all(|texel| texel.is_finite());
         (texels && size.is_finite()).then_some(Self {
@@ -217,23 +217,20 @@ impl<'m> Placed<'m> {
         [low, high]: [DVec2; 2],
         pieces: &mut Vec<Part>,
     ) {
-        let corners = [0, 1, 2].map(|k| (part.corners[k], texels[k]));
         for j in 0..=(high.y - low.y) as usize {
             for i in 0..=(high.x - low.x) as usize {
                 let corner = low + DVec2::new(i as f64, j as f64);
-                let mut polygon = corners.to_vec();
-                for axis in 0..2 {
-                    clip(&mut polygon, |texel| texel[axis] - corner[axis]);
-                    clip(&mut polygon, |texel| corner[axis] + 1.0 - texel[axis]);
-                }
-                let Some((first, rest)) = polygon.split_first() else {
-                    continue;
+                let square = TexelBox {
+                    low: corner,
+                    high: corner + 1.0,
                 };
+                let polygon = Polygon::new(part.corners, texels, &square);
+                if polygon.is_empty() {
+                    continue;
+                }
                 let cell = Some(self.cell(corner));
-                pieces.extend(rest.windows(2).map(|pair| Part {
-                    corners: [first.0, pair[0].0, pair[1].0],
-                    cell,
-                }));
+                let triangles = polygon.triangles();
+                pieces.extend(triangles.map(|corners| Part { corners, cell }));
             }
         }
     }
@@ -254,23 +251,6 @@ fn halved(part: &Part) -> [Part; 4] {
     let [a, b, c] = part.corners;
     let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
     [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].map(|corners| Part { corners, ..*part })
-}
-
-/// Keeps what of a convex polygon of (place, texel) is where `side` of the texel is not negative.
-fn clip(polygon: &mut Vec<(DVec2, DVec2)>, side: impl Fn(DVec2) -> f64) {
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (k, &(b, texel)) in polygon.iter().enumerate() {
-        let (next_b, next) = polygon[(k + 1) % polygon.len()];
-        let (here, there) = (side(texel), side(next));
-        if here >= 0.0 {
-            kept.push((b, texel));
-        }
-        if (here < 0.0) != (there < 0.0) {
-            let f = here / (here - there);
-            kept.push((b.lerp(next_b, f), texel.lerp(next, f)));
-        }
-    }
-    *polygon = kept;
 }
 
 /// The distance of the origin from a triangle, and the weights of the nearest point.
