@@ -411,8 +411,8 @@ fn info_counts_triangles_and_bytes() {
     assert_eq!(map["format"], "16-bit");
     let bytes = |value: &serde_json::Value| value.as_u64().unwrap();
     assert!(bytes(&map["bytes"]) >= 128);
-    // Finest blocks of 4x4 texels, then one of 8x8; pairs of 16 bits.
-    assert!(bytes(&map["pyramid_bytes"]) >= 4 * (4 + 1));
+    // Finest blocks of 8x4 texels, then one of 16x8; pairs of 16 bits.
+    assert!(bytes(&map["pyramid_bytes"]) >= 4 * (2 + 1));
     let memory = &info["memory"];
     // Prisms go in groups of eight, 108 bytes each.
     const PRISMS: u64 = 8 * 108;

@@ -208,13 +208,17 @@ impl<'m> Found<'m> {
     /// Lists the blocks that texels `low..=high` are in on the finest level where they are few; returns the level.
     fn start(&mut self, low: DVec2, high: DVec2) -> usize {
         let levels = self.map.pyramid().levels();
-        let longest = (high - low).max_element() as usize;
-        let fits = |level: &Level| longest >> level.shift() <= 1;
+        let sides = (high - low).to_array().map(|side| side as usize);
+        let fits = |level: &Level| {
+            let [across, up] = level.shift();
+            sides[0] >> across <= 1 && sides[1] >> up <= 1
+        };
         let top = levels.iter().position(fits).unwrap_or(levels.len() - 1);
-        let block = |x: f64| x as usize >> levels[top].shift();
+        let [across, up] = levels[top].shift();
+        let (left, right) = (low.x as usize >> across, high.x as usize >> across);
         self.blocks.clear();
-        for j in block(low.y)..=block(high.y) {
-            (self.blocks).extend((block(low.x)..=block(high.x)).map(|i| (i, j)));
+        for j in low.y as usize >> up..=high.y as usize >> up {
+            self.blocks.extend((left..=right).map(|i| (i, j)));
         }
         top
     }
@@ -222,18 +226,18 @@ impl<'m> Found<'m> {
     /// Takes the block's entry if its texels are all in the region; otherwise tells whether some can be.
     fn is_undecided(&mut self, region: &Region, level: &Level, (i, j): (usize, usize)) -> bool {
         let (width, height) = self.map.size();
-        let side = 1 << level.shift();
-        let low = DVec2::new((i * side) as f64, (j * side) as f64);
-        match region.meets(low, low + (side - 1) as f64) {
+        let reach = DVec2::from(level.block().map(|side| side as f64));
+        let low = DVec2::new(i as f64, j as f64) * reach;
+        match region.meets(low, low + reach - 1.0) {
             Meets::Outside => return false,
             Meets::Partly => return true,
             Meets::Inside => {}
         }
         // Across the map's edge only the finest entries are exact.
-        let reach = side as f64;
+        let high = low + reach;
         let exact = level.shift() == self.map.pyramid().levels()[0].shift()
-            || (low.x + reach < width as f64 && low.y + reach < height as f64);
-        if exact && region.meets(low, low + reach) == Meets::Inside {
+            || (high.x < width as f64 && high.y < height as f64);
+        if exact && region.meets(low, high) == Meets::Inside {
             self.include(level.get(i, j));
             return false;
         }
@@ -246,10 +250,10 @@ impl<'m> Found<'m> {
             return;
         }
         let (width, height) = self.map.size();
-        let side = 1 << level.shift();
-        let end = |block: usize, n: usize| n.min((block + 1) * side) - 1;
-        let columns = [(i * side) as f64, end(i, width) as f64];
-        self.take_texels(region, columns, j * side..=end(j, height));
+        let [across, up] = level.block();
+        let columns = [i * across, width.min((i + 1) * across) - 1].map(|i| i as f64);
+        let rows = j * up..=height.min((j + 1) * up) - 1;
+        self.take_texels(region, columns, rows);
     }
 
     /// The texels of a rectangle inside the map, given by first and last column and by rows, that are in the region.

@@ -128,7 +128,7 @@ fn average(finer: &HeightGrid, level: &HeightGrid, rect: TexelRect) -> TexelRect
 
 impl DisplacementMap {
     /// Makes the means, if there are none yet: [`Self::averaged`] needs them. They take a third of the map's bytes (two thirds for
-    /// 8-bit maps) beside the pyramid's sixth, and edits keep them up to date.
+    /// 8-bit maps) beside the pyramid's twelfth, and edits keep them up to date.
     pub fn build_means(&self) {
         // No edit meanwhile, or it would be lost.
         let _alone = self.editing.lock().unwrap_or_else(PoisonError::into_inner);

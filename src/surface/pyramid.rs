@@ -1,9 +1,9 @@
 //! The min/max pyramid over a displacement map: what a block of the map holds at least and at most.
 //!
-//! The finest blocks are 4x4 cells (cell (i, j) is the square between the centres of texels i, i+1 and j, j+1), those of
-//! the next level 8x8, and so on: B = 4, 8, 16, ... Entry (I, J) is the range of all texels of columns B I ..= B I + B and rows
-//! B J ..= B J + B: all that bilinear interpolation reads in the block, edges included. So **any box of texel coordinates whose
-//! sides are at most B is covered by the four entries of the blocks that its corners lie in.**
+//! The finest blocks are 8 cells across and 4 up (cell (i, j) is the square between the centres of texels i, i+1 and j, j+1), those
+//! of the next level 16x8, and so on: A x B = 8x4, 16x8, 32x16, ... Entry (I, J) is the range of all texels of columns
+//! A I ..= A I + A and rows B J ..= B J + B: all that bilinear interpolation reads in the block, edges included. So **any box of
+//! texel coordinates of at most A x B is covered by the four entries of the blocks that its corners lie in.**
 //!
 //! Columns and rows beyond the edge are those of the wrap mode: the first ones for repeat, the last one for clamp, the
 //! last ones backwards for mirror. A box that begins at x *after folding* (for mirror, where the lower of its folded ends is; at
@@ -12,9 +12,9 @@
 //!
 //! Levels go on until one entry is left; its block is at least as large as the map, so it covers everything.
 //! Entries are exact but for coarser ones that reach across an edge where the map goes on out of step with the blocks
-//! (repeat: a side that is not a multiple of B; mirror): they hold less than one block too much.
+//! (repeat: a side that is not a multiple of the block's; mirror): they hold less than one block too much.
 //!
-//! The pairs take 2/16 of the map's bytes on the finest level and 1/6 in all, at most 20 % for maps of at least
+//! The pairs take 2/32 of the map's bytes on the finest level and 1/12 in all, at most 1/9 for maps of at least
 //! 64x64 texels.
 
 mod around;
@@ -42,7 +42,7 @@ pub struct Pyramid {
 /// One level: the ranges of blocks of one size.
 #[derive(Debug)]
 pub struct Level {
-    shift: u32,
+    shift: [u32; 2],
     width: usize,
     height: usize,
     /// Where the level's entries begin among those of all.
@@ -56,8 +56,8 @@ pub struct Level {
 pub(crate) struct LevelRows {
     /// Levels.
     pub count: usize,
-    /// 1 / B.
-    pub per_block: [f32; Self::MOST],
+    /// 1 / the block's sides.
+    pub per_block: [[f32; Self::MOST]; 2],
     /// The last block of a row, and the last row.
     pub last: [[u32; Self::MOST]; 2],
     pub width: [u32; Self::MOST],
@@ -73,7 +73,8 @@ impl LevelRows {
         let row = |value: fn(&Level) -> usize| std::array::from_fn(|k| value(of(k)) as u32);
         Self {
             count: levels.len(),
-            per_block: std::array::from_fn(|k| 1.0 / (1u32 << of(k).shift) as f32),
+            per_block: [0, 1]
+                .map(|axis| std::array::from_fn(|k| 1.0 / (1u32 << of(k).shift[axis]) as f32)),
             last: [row(|level| level.width - 1), row(|level| level.height - 1)],
             width: row(|level| level.width),
             offset: row(|level| level.offset),
@@ -82,23 +83,28 @@ impl LevelRows {
 }
 
 impl Level {
-    /// log2 of the block's side B in cells: 2 for the finest level.
-    pub fn shift(&self) -> u32 {
+    /// log2 of the block's sides in cells, across and up: 3 and 2 for the finest level.
+    pub fn shift(&self) -> [u32; 2] {
         self.shift
     }
 
-    /// Blocks across: the map's width / B, rounded up.
+    /// The block's sides in cells, across and up: 8 and 4 for the finest level.
+    pub fn block(&self) -> [usize; 2] {
+        self.shift.map(|shift| 1 << shift)
+    }
+
+    /// Blocks across: the map's width by the block's, rounded up.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Blocks up: the map's height / B, rounded up.
+    /// Blocks up: the map's height by the block's, rounded up.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Smallest and largest texel of columns B i ..= B i + B and rows B j ..= B j + B, as stored: 0..=255, 0..=65535 or
-    /// heights (see [`DisplacementMap::unit`](super::DisplacementMap::unit)).
+    /// Smallest and largest texel of columns a i ..= a i + a and rows b j ..= b j + b, for blocks of a x b cells, as stored:
+    /// 0..=255, 0..=65535 or heights (see [`DisplacementMap::unit`](super::DisplacementMap::unit)).
     ///
     /// # Panics
     ///
@@ -123,11 +129,12 @@ impl Level {
 impl Pyramid {
     /// Over width x height texels, at least 1x1, finite.
     pub(super) fn new(texels: &Texels, width: usize, height: usize, wrap: Wrap) -> Self {
-        let axes = [width, height].map(|texels| Axis {
+        let axis = |texels: usize, side: usize| Axis {
             texels,
             wrap,
-            shift: reduce::SIDE.ilog2(),
-        });
+            shift: side.ilog2(),
+        };
+        let axes = [axis(width, reduce::WIDTH), axis(height, reduce::HEIGHT)];
         let levels = match texels {
             Texels::U8(t) => build::levels(t, axes),
             Texels::U16(t) => build::levels(t, axes),
@@ -197,13 +204,13 @@ impl Pyramid {
         /// Rows of blocks at a time, so that an edit of a whole map needs no second one in memory.
         const BAND: usize = 64;
         let (level, [x, y]) = (&self.levels[0], self.axes);
-        let first = reduce::SIDE * is.start;
+        let first = reduce::WIDTH * is.start;
         let length = reduce::columns(is.len());
         let mut texels = Vec::new();
         for start in js.clone().step_by(BAND) {
             let band = start..js.end.min(start + BAND);
-            let bottom = reduce::SIDE * band.start;
-            let rows = reduce::columns(band.len());
+            let bottom = reduce::HEIGHT * band.start;
+            let rows = reduce::rows(band.len());
             texels.resize(rows * length, 0.0);
             for (j, out) in texels.chunks_exact_mut(length).enumerate() {
                 let j = y.wrap.texel((bottom + j) as i64, y.texels);

@@ -205,16 +205,17 @@ impl Lanes for Avx2 {
             let level = _mm256_sub_epi32(exponent, _mm256_set1_epi32(128));
             let last = _mm256_set1_epi32(rows.count as i32 - 1);
             let level = _mm256_min_epi32(_mm256_max_epi32(level, _mm256_setzero_si256()), last);
-            let per_block = Self(looked_up(rows.per_block.as_ptr().cast(), level));
+            let per_x = Self(looked_up(rows.per_block[0].as_ptr(), level));
+            let per_y = Self(looked_up(rows.per_block[1].as_ptr(), level));
             let last_i = _mm256_castps_si256(looked_up(rows.last[0].as_ptr().cast(), level));
             let last_j = _mm256_castps_si256(looked_up(rows.last[1].as_ptr().cast(), level));
-            let (mut end_i, mut end_j) = (x[1] * per_block, y[1] * per_block);
+            let (mut end_i, mut end_j) = (x[1] * per_x, y[1] * per_y);
             if !is_inside {
                 end_i = grid.within(end_i.floor(), Self(_mm256_cvtepi32_ps(last_i)));
                 end_j = grid.within(end_j.floor(), Self(_mm256_cvtepi32_ps(last_j)));
             }
-            let i = [whole(x[0] * per_block, last_i), whole(end_i, last_i)];
-            let j = [whole(y[0] * per_block, last_j), whole(end_j, last_j)];
+            let i = [whole(x[0] * per_x, last_i), whole(end_i, last_i)];
+            let j = [whole(y[0] * per_y, last_j), whole(end_j, last_j)];
             let width = _mm256_castps_si256(looked_up(rows.width.as_ptr().cast(), level));
             let offset = _mm256_castps_si256(looked_up(rows.offset.as_ptr().cast(), level));
             of_blocks(grid.levels[0].entries(), i, j, width, offset)

@@ -182,10 +182,10 @@ impl<'m> Grid<'m> {
         folded as f32
     }
 
-    /// The finest level of the pyramid whose blocks are at least `size` texels wide.
+    /// The finest level of the pyramid whose blocks are at least `size` texels in both directions.
     #[inline(always)]
     pub fn level(&self, size: f32) -> usize {
-        // Blocks of level l are 4 << l wide: the exponent, 129 for sizes from 4 to 8.
+        // Blocks of level l are 8 << l across and 4 << l up: the exponent, 129 for sizes from 4 to 8.
         let exponent = (size.abs().to_bits() >> 23) as usize;
         exponent.saturating_sub(128).min(self.rows.count - 1)
     }
@@ -195,11 +195,12 @@ impl<'m> Grid<'m> {
     #[inline(always)]
     pub fn block_range<L: Lanes>(&self, level: usize, x: [L; 2], y: [L; 2]) -> [L; 2] {
         let level = level % LevelRows::MOST;
-        let per_block = L::splat(self.rows.per_block[level]);
+        let per_x = L::splat(self.rows.per_block[0][level]);
+        let per_y = L::splat(self.rows.per_block[1][level]);
         let is_inside = self.is_inside(x, y);
         let (x, y) = self.folded_boxes(is_inside, x, y);
-        let mut i = [x[0] * per_block, x[1] * per_block];
-        let mut j = [y[0] * per_block, y[1] * per_block];
+        let mut i = [x[0] * per_x, x[1] * per_x];
+        let mut j = [y[0] * per_y, y[1] * per_y];
         if !is_inside {
             let [last_i, last_j] = [0, 1].map(|axis| self.rows.last[axis][level] as f32);
             i[1] = self.within(i[1].floor(), L::splat(last_i));

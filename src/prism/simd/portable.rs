@@ -166,9 +166,9 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
         let row = |value: &dyn Fn(&Level) -> f32| {
             Self::from_array(std::array::from_fn(|l| value(level(l))))
         };
-        let per_block = row(&|level| 1.0 / (1u32 << level.shift()) as f32);
-        let mut i = x.map(|x| x * per_block);
-        let mut j = y.map(|y| y * per_block);
+        let per_block = [0, 1].map(|axis| row(&|level| 1.0 / (1u32 << level.shift()[axis]) as f32));
+        let mut i = x.map(|x| x * per_block[0]);
+        let mut j = y.map(|y| y * per_block[1]);
         if !is_inside {
             i[1] = grid.within(i[1].floor(), row(&|level| (level.width() - 1) as f32));
             j[1] = grid.within(j[1].floor(), row(&|level| (level.height() - 1) as f32));

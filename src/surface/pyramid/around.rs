@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use glam::DVec2;
 
-use crate::surface::{DisplacementMap, Wrap};
+use crate::surface::{DisplacementMap, Level, Wrap};
 
 /// Texels of slack around a box, against rounding of whoever samples.
 const SLACK: f64 = 0.01;
@@ -14,14 +14,13 @@ const SMALL: f64 = 2.0;
 
 impl DisplacementMap {
     /// Smallest and largest height that samples in the box from `low` to `high` (texel coordinates) can have; of a box of more than
-    /// [`SMALL`] texels that of blocks around it, which reach less than the box's longest side, or that of a finest block, too far.
+    /// [`SMALL`] texels that of blocks around it, which reach less than twice the box's longest side, or a finest block, too far.
     pub(crate) fn range_in_box(&self, low: DVec2, high: DVec2) -> (f32, f32) {
         let (low, high) = (low - SLACK, high + SLACK);
-        let side = (high - low).max_element();
-        if side <= SMALL {
+        if (high - low).max_element() <= SMALL {
             self.range_of_texels(low.floor(), high.floor() + 1.0)
         } else {
-            self.range_of_blocks(low, high, 0.5 * side)
+            self.range_of_blocks(low, high)
         }
     }
 
@@ -39,27 +38,28 @@ impl DisplacementMap {
         range
     }
 
-    /// The blocks of at least `side` that the box meets.
-    fn range_of_blocks(&self, low: DVec2, high: DVec2, side: f64) -> (f32, f32) {
+    /// The blocks that the box meets, on the finest level on which they have half its sides.
+    fn range_of_blocks(&self, low: DVec2, high: DVec2) -> (f32, f32) {
         let levels = self.pyramid.levels();
-        let finest = levels[0].shift();
-        let wanted = if side.is_finite() {
-            side.log2().ceil().max(0.0) as u32
-        } else {
-            u32::MAX
+        let half = 0.5 * (high - low);
+        let is_held = |level: &&Level| {
+            let [across, up] = level.block().map(|side| side as f64);
+            half.x <= across && half.y <= up
         };
-        let level = &levels[(wanted.saturating_sub(finest) as usize).min(levels.len() - 1)];
+        let level = levels.iter().find(is_held);
+        let level = level.unwrap_or(&levels[levels.len() - 1]);
         let (width, height) = self.size();
-        let blocks = |low: f64, high: f64, n: usize, count: usize| {
+        let [across, up] = level.block();
+        let blocks = |low: f64, high: f64, n: usize, side: usize| {
             images(self.wrap(), low, high, n as f64).map(|image| {
                 image.map(|[a, b]| -> RangeInclusive<usize> {
-                    let [a, b] = [a, b].map(|x| (x as usize >> level.shift()).min(count - 1));
+                    let [a, b] = [a, b].map(|x| (x as usize).min(n - 1) / side);
                     a..=b
                 })
             })
         };
-        let columns = blocks(low.x, high.x, width, level.width());
-        let rows = blocks(low.y, high.y, height, level.height());
+        let columns = blocks(low.x, high.x, width, across);
+        let rows = blocks(low.y, high.y, height, up);
         let mut range = (f32::INFINITY, f32::NEG_INFINITY);
         for j in rows.into_iter().flatten().flatten() {
             for i in columns.iter().flatten().cloned().flatten() {

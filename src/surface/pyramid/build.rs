@@ -9,7 +9,7 @@ use super::entries::{Entries, Pack};
 use super::{Level, reduce};
 
 /// Below so many entries a level is made on one thread.
-const PARALLEL: usize = (256 / reduce::SIDE) * (256 / reduce::SIDE);
+const PARALLEL: usize = (256 / reduce::WIDTH) * (256 / reduce::HEIGHT);
 
 /// The levels over texels of sides `x` and `y`, whose shifts are those of the finest level. On how many threads
 /// they are made changes nothing in them.
@@ -35,7 +35,7 @@ pub fn levels<T: Pack>(texels: &[T], axes: [Axis; 2]) -> Vec<Level> {
     let entries = Arc::new(T::entries(entries));
     let levels = shapes.iter().zip(offsets);
     let level = |([x, y], offset): (&[Axis; 2], usize)| Level {
-        shift: x.shift,
+        shift: [x.shift, y.shift],
         width: x.blocks(),
         height: y.blocks(),
         offset,

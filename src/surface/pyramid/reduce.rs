@@ -4,19 +4,22 @@
 use super::axis::{Axis, Parts};
 use super::entries::Bounds;
 
-/// Columns and rows of texels that one finest entry holds beyond its own block of [`SIDE`].
-pub const BEYOND: usize = 1;
+/// Columns and rows of texels that one finest entry holds beyond its own block of [`WIDTH`] and [`HEIGHT`].
+const BEYOND: usize = 1;
 
 /// Cells across the finest blocks.
-pub const SIDE: usize = 4;
+pub const WIDTH: usize = 8;
+
+/// Cells up the finest blocks.
+pub const HEIGHT: usize = 4;
 
 /// The smallest and largest of every column of some rows.
 pub struct Strip<T> {
     low: Vec<T>,
     high: Vec<T>,
-    /// The same of columns 4i .. 4i + 4.
-    low_of_four: Vec<T>,
-    high_of_four: Vec<T>,
+    /// The same of columns 8i .. 8i + 8.
+    low_of_block: Vec<T>,
+    high_of_block: Vec<T>,
 }
 
 // The loops below are of the form that the compiler turns into vector code: slices side by side, no index.
@@ -25,13 +28,13 @@ impl<T: Copy + PartialOrd> Strip<T> {
         Self {
             low: Vec::new(),
             high: Vec::new(),
-            low_of_four: Vec::new(),
-            high_of_four: Vec::new(),
+            low_of_block: Vec::new(),
+            high_of_block: Vec::new(),
         }
     }
 
     /// Of five rows of one length.
-    fn set_rows(&mut self, [a, b, c, d, e]: [&[T]; SIDE + BEYOND]) {
+    fn set_rows(&mut self, [a, b, c, d, e]: [&[T]; HEIGHT + BEYOND]) {
         let all = || a.iter().zip(b).zip(c.iter().zip(d)).zip(e);
         let low = all().map(|(((&a, &b), (&c, &d)), &e)| min(min(min(a, b), min(c, d)), e));
         replace(&mut self.low, low);
@@ -49,27 +52,34 @@ impl<T: Copy + PartialOrd> Strip<T> {
 
     /// Prepares [`Self::entries`] of the columns there are.
     fn join_columns(&mut self) {
-        let low = self.low.chunks_exact(SIDE);
-        let high = self.high.chunks_exact(SIDE);
+        let (low, _) = self.low.as_chunks();
+        let (high, _) = self.high.as_chunks();
         replace(
-            &mut self.low_of_four,
-            low.map(|c| min(min(c[0], c[1]), min(c[2], c[3]))),
+            &mut self.low_of_block,
+            low.iter().map(|&c| of_block(c, min)),
         );
         replace(
-            &mut self.high_of_four,
-            high.map(|c| max(max(c[0], c[1]), max(c[2], c[3]))),
+            &mut self.high_of_block,
+            high.iter().map(|&c| of_block(c, max)),
         );
     }
 
-    /// Smallest and largest of columns 4i ..= 4i + 4, for each i that has them.
+    /// Smallest and largest of columns 8i ..= 8i + 8, for each i that has them.
     pub fn entries(&self) -> impl Iterator<Item = (T, T)> {
         // One block, and the first column of the next.
-        let low = (self.low_of_four.iter()).zip(self.low[SIDE..].chunks(SIDE));
-        let high = (self.high_of_four.iter()).zip(self.high[SIDE..].chunks(SIDE));
+        let low = (self.low_of_block.iter()).zip(self.low[WIDTH..].chunks(WIDTH));
+        let high = (self.high_of_block.iter()).zip(self.high[WIDTH..].chunks(WIDTH));
         low.zip(high).map(|((&low, next_low), (&high, next_high))| {
             (min(low, next_low[0]), max(high, next_high[0]))
         })
     }
+}
+
+/// The columns of a block as one, halves first.
+#[inline(always)]
+fn of_block<T: Copy>(c: [T; WIDTH], one: impl Fn(T, T) -> T) -> T {
+    let four: [T; 4] = std::array::from_fn(|i| one(c[i], c[i + 4]));
+    one(one(four[0], four[2]), one(four[1], four[3]))
 }
 
 fn replace<T>(column: &mut Vec<T>, by: impl Iterator<Item = T>) {
@@ -88,7 +98,7 @@ pub fn finest<'t, T: Copy + PartialOrd + 't>(
 ) {
     let mut strip = Strip::new();
     for j in rows {
-        strip.set_rows(std::array::from_fn(|k| row(SIDE * j + k)));
+        strip.set_rows(std::array::from_fn(|k| row(HEIGHT * j + k)));
         strip.extend(length, &source);
         strip.join_columns();
         done(j, &strip);
@@ -97,7 +107,12 @@ pub fn finest<'t, T: Copy + PartialOrd + 't>(
 
 /// Columns of texels under `blocks` finest entries side by side.
 pub fn columns(blocks: usize) -> usize {
-    SIDE * blocks + BEYOND
+    WIDTH * blocks + BEYOND
+}
+
+/// Rows of texels under `blocks` finest entries one above the other.
+pub fn rows(blocks: usize) -> usize {
+    HEIGHT * blocks + BEYOND
 }
 
 /// Entry (i, j) of the level above the one that `entry` reads and `x` and `y` describe.
