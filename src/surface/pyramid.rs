@@ -114,9 +114,16 @@ impl Level {
         self.entries.get(self.index(i, j))
     }
 
-    /// The pairs of all levels as stored, level by level and row by row.
+    /// The pairs of all levels as stored, level by level and row by row: that of block (i, j) of this one is
+    /// [`Self::offset`] + j [`Self::width`] + i.
     pub(crate) fn entries(&self) -> &Entries {
         &self.entries
+    }
+
+    /// Where the level's pairs begin in [`Self::entries`].
+    #[cfg_attr(not(test), expect(dead_code, reason = "for the test of blocks"))]
+    pub(crate) fn offset(&self) -> usize {
+        self.offset
     }
 
     #[inline]

@@ -157,8 +157,8 @@ impl Texel for f32 {
 }
 
 /// The texels of a map of width x height: (width + 1) x (height + 1) of them, one more column and row as the wrap modes
-/// continue them, so that the four corners of every cell lie at fixed offsets; then [`Self::TAIL`] more, so that a
-/// 32-bit gather of the last 8-bit texel stays inside.
+/// continue them, so that the four corners of every cell lie at fixed offsets; then [`Self::TAIL`] more, so that nine
+/// texels from any one on, and a 32-bit gather of the last 8-bit texel, stay inside.
 #[derive(Debug)]
 pub(crate) enum StoredTexels {
     U8(Box<[AtomicU8]>),
@@ -169,7 +169,7 @@ pub(crate) enum StoredTexels {
 
 impl StoredTexels {
     /// Texels stored after the last one.
-    const TAIL: usize = 4;
+    const TAIL: usize = 16;
 
     /// Stores `texels`, width * height of them.
     pub fn new(texels: Texels, width: usize, height: usize, wrap: [Wrap; 2]) -> Self {

@@ -11,7 +11,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 use std::sync::atomic::AtomicU32;
 
-use super::{Grid, LANES, Lanes, Task};
+use super::{Grid, LANES, Lanes, Task, nine};
 use crate::surface::{Entries, StoredTexels};
 
 #[derive(Clone, Copy)]
@@ -228,7 +228,7 @@ impl Lanes for Avx2 {
         // 0 <= i <= width - 1 and 0 <= j <= height - 1, so index + stride + 1 is at most
         // (height + 1) * (width + 1) - 1, the last stored texel; it fits i32 because sides are at most
         // `DisplacementMap::MAX_SIDE`. The 32-bit loads of narrower texels start at such a texel and end inside
-        // the four texels that `StoredTexels` keeps after the last one.
+        // the texels that `StoredTexels` keeps after the last one.
         // An edit on another thread may store to these atomics meanwhile. The language has no atomic gather, so this
         // rests on the machine: the memory is atomics', so the compiler takes no value for constant, the intrinsic
         // is opaque to it, and x86 never tears an aligned texel: it is the old one or the new one.
@@ -259,6 +259,77 @@ impl Lanes for Avx2 {
                         Self(_mm256_i32gather_ps::<4>(right, index)),
                         Self(_mm256_i32gather_ps::<4>(left, above)),
                         Self(_mm256_i32gather_ps::<4>(right, above)),
+                    ]
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn entries(entries: &Entries, index: [u32; LANES]) -> [Self; 2] {
+        let last = entries.count() - 1;
+        // SAFETY: AVX2 is there. Moved down to the last, the numbers are of stored pairs, of which there are fewer than 2^31 by
+        // `DisplacementMap::MAX_SIDE`; the 32-bit load of a pair of bytes ends inside the pairs that `Entries` keeps after the
+        // last one. Edits meanwhile: as in `cell_corners`; a pair of floats may be one old and one new.
+        unsafe {
+            let index = _mm256_loadu_si256(index.as_ptr().cast());
+            let index = _mm256_min_epu32(index, _mm256_set1_epi32(last as i32));
+            let (low, high) = match entries {
+                Entries::U8(e) => pair::<8>(_mm256_i32gather_epi32::<2>(e.as_ptr().cast(), index)),
+                Entries::U16(e) => {
+                    pair::<16>(_mm256_i32gather_epi32::<4>(e.as_ptr().cast(), index))
+                }
+                Entries::F32(e) => {
+                    let low = e.as_ptr().cast::<f32>();
+                    (
+                        Self(_mm256_i32gather_ps::<8>(low, index)),
+                        Self(_mm256_i32gather_ps::<8>(low.add(1), index)),
+                    )
+                }
+            };
+            [low, high]
+        }
+    }
+
+    #[inline(always)]
+    fn texel_rows(texels: &StoredTexels, index: usize) -> [Self; 2] {
+        let zeros = [Self::splat(0.0); 2];
+        // SAFETY: AVX2 is there. Loads of eight texels from the first and from the second of nine. Edits meanwhile: as in
+        // `cell_corners`; x86 reads each aligned texel of a vector load whole.
+        unsafe {
+            match texels {
+                StoredTexels::U8(t) => {
+                    let Some(row) = nine(t, index) else {
+                        return zeros;
+                    };
+                    let row = row.as_ptr();
+                    let left = _mm256_cvtepu8_epi32(_mm_loadl_epi64(row.cast()));
+                    let right = _mm256_cvtepu8_epi32(_mm_loadl_epi64(row.add(1).cast()));
+                    [
+                        Self(_mm256_cvtepi32_ps(left)),
+                        Self(_mm256_cvtepi32_ps(right)),
+                    ]
+                }
+                StoredTexels::U16(t) => {
+                    let Some(row) = nine(t, index) else {
+                        return zeros;
+                    };
+                    let row = row.as_ptr();
+                    let left = _mm256_cvtepu16_epi32(_mm_loadu_si128(row.cast()));
+                    let right = _mm256_cvtepu16_epi32(_mm_loadu_si128(row.add(1).cast()));
+                    [
+                        Self(_mm256_cvtepi32_ps(left)),
+                        Self(_mm256_cvtepi32_ps(right)),
+                    ]
+                }
+                StoredTexels::F32(t) => {
+                    let Some(row) = nine(t, index) else {
+                        return zeros;
+                    };
+                    let row = row.as_ptr();
+                    [
+                        Self(_mm256_loadu_ps(row.cast())),
+                        Self(_mm256_loadu_ps(row.add(1).cast())),
                     ]
                 }
             }

@@ -16,7 +16,7 @@ mod avx2_quad;
 use std::ops::{Add, Div, Mul, Sub};
 use std::sync::atomic::AtomicU32;
 
-use crate::surface::{DisplacementMap, Level, LevelRows, StoredTexels, Wrap};
+use crate::surface::{DisplacementMap, Entries, Level, LevelRows, StoredTexels, Wrap};
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -127,6 +127,13 @@ pub(crate) trait Lanes:
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), integers in float lanes.
     /// Cells outside the grid, and NaN, are moved inside first.
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4];
+    /// Smallest and largest stored texel of blocks, given by the numbers of their pairs; beyond the last pair there is that one.
+    #[cfg_attr(not(test), expect(dead_code, reason = "for the test of blocks"))]
+    fn entries(entries: &Entries, index: [u32; LANES]) -> [Self; 2];
+    /// The stored texels from `index` on, and from `index` + 1 on: the left and the right ends of eight cells in a row. Zeros where
+    /// not all nine are stored; from the first to the last texel of a map they are.
+    #[cfg_attr(not(test), expect(dead_code, reason = "for the test of blocks"))]
+    fn texel_rows(texels: &StoredTexels, index: usize) -> [Self; 2];
 }
 
 /// At least the texels that a curve in one piece reaches from its base.
@@ -346,6 +353,12 @@ impl<'m> Grid<'m> {
     }
 }
 
+/// Nine in a row.
+#[inline(always)]
+fn nine<T>(stored: &[T], index: usize) -> Option<&[T; LANES + 1]> {
+    stored.get(index..)?.first_chunk()
+}
+
 /// `(b, a)` where the sign bit is set, `(a, b)` elsewhere.
 #[inline(always)]
 fn swapped<L: Lanes>(sign: L, a: L, b: L) -> (L, L) {
@@ -359,6 +372,9 @@ fn periodic<L: Lanes>(i: L, n: L) -> L {
     let i = i.select_negative(i + n, i);
     (i - n).select_negative(i, i - n)
 }
+
+#[cfg(test)]
+mod stored_tests;
 
 #[cfg(test)]
 mod tests {

@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{BVec4A, Vec4};
 
-use super::{Grid, LANES, Lanes, Task};
+use super::{Grid, LANES, Lanes, Task, nine};
 use crate::prism::steps;
-use crate::surface::{Level, StoredTexels, Texel};
+use crate::surface::{Entries, Level, StoredTexels, Texel};
 
 /// `COUNTED`: every look into a map counts as a step of the march.
 #[derive(Clone, Copy)]
@@ -189,6 +189,38 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
             StoredTexels::F32(t) => corners::<f32>(t, grid, i, j),
         };
         corners.map(Self::from_array)
+    }
+
+    #[inline(always)]
+    fn entries(entries: &Entries, index: [u32; LANES]) -> [Self; 2] {
+        if COUNTED {
+            steps::count();
+        }
+        let last = entries.count() - 1;
+        let pairs = index.map(|index| entries.get((index as usize).min(last)));
+        [pairs.map(|pair| pair.0), pairs.map(|pair| pair.1)].map(Self::from_array)
+    }
+
+    #[inline(always)]
+    fn texel_rows(texels: &StoredTexels, index: usize) -> [Self; 2] {
+        if COUNTED {
+            steps::count();
+        }
+        let row = match texels {
+            StoredTexels::U8(t) => row::<u8>(t, index),
+            StoredTexels::U16(t) => row::<u16>(t, index),
+            StoredTexels::F32(t) => row::<f32>(t, index),
+        };
+        [0, 1].map(|from| Self::from_array(std::array::from_fn(|l| row[from + l])))
+    }
+}
+
+/// Nine texels, or zeros.
+#[inline(always)]
+fn row<T: Texel>(t: &[T::Atomic], index: usize) -> [f32; LANES + 1] {
+    match nine(t, index) {
+        Some(row) => std::array::from_fn(|i| T::load(&row[i]).into()),
+        None => [0.0; LANES + 1],
     }
 }
 

@@ -109,6 +109,17 @@ impl Entries {
         }
     }
 
+    /// Pairs, those after the last one not counted. There is at least one.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        let all = match self {
+            Self::U8(e) => e.len(),
+            Self::U16(e) => e.len(),
+            Self::F32(e) => e.len() / 2,
+        };
+        all - Self::TAIL
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         match self {

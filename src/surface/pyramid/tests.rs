@@ -78,6 +78,8 @@ proptest! {
                     let exact = k == 0 || WRAPS[wrap] == Wrap::Clamp
                         || !cut(i, width, across) && !cut(j, height, up);
                     prop_assert!(!exact || found == (low, high), "{k} {i} {j}");
+                    let index = level.offset() + j * level.width + i;
+                    prop_assert_eq!(level.entries().get(index), found);
                 }
             }
         }
