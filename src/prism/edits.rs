@@ -2,7 +2,6 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::simd::LANES;
 use super::touch::Touch;
 use super::{Parts, Prisms};
 use crate::surface::{DisplacedSurface, DisplacementMap, TexelKind, TexelRect};
@@ -97,42 +96,31 @@ impl Prisms {
         let touch = Touch::new(map, rect);
         match &self.parts {
             Parts::Exact(exact) => {
-                for (index, cluster) in exact.clusters.iter().enumerate() {
+                let triangles = self.surface.mesh().triangles().len() as u32;
+                for triangle in 0..triangles {
+                    let corners = around(self.surface.corner_texcoords(triangle));
                     // Walls look at the map elsewhere too.
-                    let has_walls = |lane| cluster.walls(lane) != 0;
-                    let bounds = cluster.texcoord_bounds();
-                    if bounds.is_some_and(|bounds| touch.misses(bounds))
-                        && !(0..LANES).any(has_walls)
+                    let has_walls = !self.surface.walls_of(triangle).is_empty();
+                    if touch.misses(corners) && !has_walls
+                        || !self.surface.overlaps(triangle, rect)
                     {
                         continue;
                     }
-                    let primitive = index as u32;
-                    let mut before = None;
-                    for lane in 0..exact.len(index) {
-                        if touch.misses(cluster.lane_texcoord_bounds(lane)) && !has_walls(lane) {
-                            continue;
-                        }
-                        let prim = cluster.prim(lane);
-                        if self.surface.overlaps(prim, rect) {
-                            let patch = self.surface.patch(prim);
-                            change.touched += 1;
-                            // There is room for all other texels: these alone decide, if all of them fit.
-                            let stored = cluster.offsets(lane);
-                            if holds(stored, patch.offsets_of(patch.displacements(edited))) {
-                                continue;
-                            }
-                            let offsets = self.edit_bounds.offsets(&self.surface, prim);
-                            if !holds(stored, offsets) {
-                                before.get_or_insert_with(|| self.bounds(primitive));
-                                cluster.widen(lane, &patch, offsets);
-                            }
-                        }
+                    change.touched += 1;
+                    let patch = self.surface.patch(triangle);
+                    let record = exact.record(triangle);
+                    // There is room for all other texels: these alone decide, if all of them fit.
+                    let edited = patch.offsets_of(patch.displacements(edited));
+                    if !holds(record.offsets(), edited) {
+                        record.widen(self.edit_bounds.offsets(&self.surface, triangle));
                     }
-                    // A prism may grow within the box of its cluster.
-                    if before.is_some_and(|before| before != self.bounds(primitive)) {
-                        change.primitives.push(primitive);
+                    for primitive in exact.primitives_of(triangle) {
+                        if exact.widen(&self.surface, self.room, primitive) {
+                            change.primitives.push(primitive);
+                        }
                     }
                 }
+                change.primitives.sort_unstable();
             }
             Parts::Uniform(uniform) => {
                 for (prim, record) in (0u32..).zip(&uniform.records) {

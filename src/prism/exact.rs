@@ -1,303 +1,415 @@
-//! Prisms for the exact march: clusters of eight, and the hit test of one cluster.
+//! What a backend traces of the exact march, and the hit test of one primitive.
+//!
+//! Primitives are, in this order: blocks of texels; base triangles that have none ([`Whole`]), each at once; and the walls of base triangles where seams are
+//! closed.
 
-use super::cluster::{Cluster, MOST_PRISMS, groups};
-use super::detail::turned;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::block::{Ask, Block, Crossing, Cutter, Record, nearest, outline};
 use super::edits::EditBounds;
-use super::march::exact::{
-    Arcs, CutArcs, Found, FoundArcs, Problem, Search, Units, hit, search_arc, walls,
-};
-use super::ray_frame::{Anchored, RayFrame, axes};
-use super::sight::Sight;
-use super::simd::{LANES, Lanes};
-use super::{MarchError, Parts, PrismHit, Prisms};
-use crate::ray::Ray;
-use crate::surface::DisplacedSurface;
+use super::judge::{Cells, Found, Question, walls, within};
+use super::march::polish::Root;
+use super::ray_frame::{RayFrame, axes};
+use super::simd::{Lanes, Task};
+use super::{Parts, PrismHit, Prisms};
+use crate::ray::{Aabb, Ray};
+use crate::surface::{Corners, DisplacedSurface, DisplacementMap, Patch, TexelBox};
 
-/// One cluster per eight base triangles.
+/// The primitives of a surface.
 pub struct ExactPrisms {
-    pub clusters: Vec<Cluster>,
-    /// Base triangles.
-    prims: usize,
+    /// By base triangle.
+    records: Vec<Record>,
+    /// By base triangle, then by place.
+    blocks: Vec<Block>,
+    /// Base triangles without blocks, ascending.
+    wholes: Vec<u32>,
+    /// Base triangles with walls, ascending.
+    walled: Vec<u32>,
+    /// By primitive.
+    boxes: Vec<StoredBox>,
+}
+
+/// What a primitive is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Primitive {
+    Block(Block),
+    /// All of a base triangle.
+    Whole(u32),
+    /// The walls of a base triangle.
+    Walls(u32),
+}
+
+impl Primitive {
+    pub fn triangle(self) -> u32 {
+        match self {
+            Self::Block(block) => block.triangle,
+            Self::Whole(triangle) | Self::Walls(triangle) => triangle,
+        }
+    }
+}
+
+/// Bits of a box that edits widen in place.
+struct StoredBox([AtomicU32; 6]);
+
+impl StoredBox {
+    fn new(bounds: Aabb) -> Self {
+        let ([x0, y0, z0], [x1, y1, z1]) = (bounds.min.to_array(), bounds.max.to_array());
+        Self([x0, y0, z0, x1, y1, z1].map(|x| AtomicU32::new(x.to_bits())))
+    }
+
+    fn get(&self) -> Aabb {
+        let at = |k: usize| f32::from_bits(self.0[k].load(Ordering::Relaxed));
+        Aabb {
+            min: Vec3::new(at(0), at(1), at(2)),
+            max: Vec3::new(at(3), at(4), at(5)),
+        }
+    }
+
+    /// Whether it did not hold `wanted`.
+    fn widen(&self, wanted: Aabb) -> bool {
+        let mut grown = false;
+        for axis in 0..3 {
+            let ends = [&self.0[axis], &self.0[axis + 3]];
+            grown |= super::edits::widen(ends, [wanted.min[axis], wanted.max[axis]]);
+        }
+        grown
+    }
 }
 
 impl ExactPrisms {
-    pub fn new(surface: &DisplacedSurface, bounds: EditBounds) -> Result<Self, MarchError> {
-        let prims = surface.mesh().triangles().len();
-        if prims > MOST_PRISMS {
-            return Err(MarchError::TooManyTriangles {
-                found: prims,
-                max: MOST_PRISMS,
+    pub fn new(surface: &DisplacedSurface, bounds: EditBounds) -> Self {
+        let count = surface.mesh().triangles().len() as u32;
+        let cutter = Cutter::new(surface.map());
+        let room = bounds.room(surface.map());
+        let mut made = Self {
+            records: Vec::with_capacity(count as usize),
+            blocks: Vec::new(),
+            wholes: Vec::new(),
+            walled: Vec::new(),
+            boxes: Vec::new(),
+        };
+        for triangle in 0..count {
+            let patch = surface.patch(triangle);
+            let offsets = bounds.offsets(surface, triangle);
+            let first = made.blocks.len();
+            let cut = cutter.cut(triangle, &patch, offsets, |block| made.blocks.push(block));
+            let record = cut.unwrap_or_else(|_| {
+                made.wholes.push(triangle);
+                Record::without_blocks(offsets)
             });
+            // Blocks of which no leaf reaches the triangle are none.
+            let mut kept = first;
+            for index in first..made.blocks.len() {
+                let block = made.blocks[index];
+                let bounds = outline(surface, &record, block, room);
+                if bounds.is_valid() {
+                    made.blocks[kept] = block;
+                    made.boxes.push(StoredBox::new(bounds));
+                    kept += 1;
+                }
+            }
+            made.blocks.truncate(kept);
+            made.records.push(record);
+            if !surface.walls_of(triangle).is_empty() {
+                made.walled.push(triangle);
+            }
         }
-        let centroids: Vec<_> = (0..prims as u32)
-            .map(|prim| {
-                let [a, b, c] = surface.mesh().corners(prim).map(|p| p.as_dvec3());
-                a + b + c
-            })
-            .collect();
-        let offsets = |prim| bounds.offsets(surface, prim);
-        Ok(Self {
-            clusters: groups(&centroids)
-                .chunks(LANES)
-                .map(|prims| Cluster::new(surface, prims, offsets))
-                .collect(),
-            prims,
-        })
+        for primitive in made.boxes.len()..made.len() {
+            let bounds = made.bounds_now(surface, room, primitive as u32);
+            made.boxes.push(StoredBox::new(bounds));
+        }
+        made
     }
 
-    /// One cluster of as many prisms.
-    pub fn of_one(cluster: Cluster, prims: usize) -> Self {
-        Self {
-            clusters: vec![cluster],
-            prims,
+    /// Number of primitives.
+    pub fn len(&self) -> usize {
+        self.blocks.len() + self.wholes.len() + self.walled.len()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.records[..])
+            + size_of_val(&self.blocks[..])
+            + size_of_val(&self.wholes[..])
+            + size_of_val(&self.walled[..])
+            + size_of_val(&self.boxes[..])
+    }
+
+    /// # Panics
+    ///
+    /// If there is no such primitive.
+    #[inline(always)]
+    pub fn primitive(&self, index: u32) -> Primitive {
+        let index = index as usize;
+        if let Some(&block) = self.blocks.get(index) {
+            return Primitive::Block(block);
+        }
+        let index = index - self.blocks.len();
+        match self.wholes.get(index) {
+            Some(&triangle) => Primitive::Whole(triangle),
+            None => Primitive::Walls(self.walled[index - self.wholes.len()]),
         }
     }
 
-    /// Prisms in a cluster: its first lanes.
-    #[inline(always)]
-    pub fn len(&self, cluster: usize) -> usize {
-        (self.prims - cluster * LANES).min(LANES)
-    }
-}
-
-/// A cluster, and a ray in its frame, from a point beside the cluster.
-struct Approach<'a> {
-    prisms: &'a Prisms,
-    cluster: &'a Cluster,
-    /// Lanes with a prism.
-    used: u32,
-    frame: RayFrame,
-    ray: Anchored,
-}
-
-impl<'a> Approach<'a> {
-    #[inline(always)]
-    fn new(prisms: &'a Prisms, index: u32, ray: &Ray) -> Option<Self> {
-        let Parts::Exact(exact) = &prisms.parts else {
-            return None;
-        };
-        let cluster = &exact.clusters[index as usize];
-        let frame = RayFrame::new(ray, axes(ray));
-        Some(Self {
-            prisms,
-            cluster,
-            used: (1 << exact.len(index as usize)) - 1,
-            ray: frame.anchored(cluster.anchor(frame.axes[2]), ray),
-            frame,
-        })
-    }
-
-    /// The prisms, as the ray sees them, and the lanes that it may meet.
-    #[inline(always)]
-    fn sight<L: Lanes>(&self) -> (Sight<L>, u32) {
-        let prisms = self.cluster.lanes::<L>(self.ray.axes);
-        let (sight, met) = Sight::new(&prisms, &self.ray.splat());
-        (sight, met & self.used)
-    }
-
-    /// Their arcs.
-    #[inline(always)]
-    fn cut<L: Lanes>(&self, sight: &Sight<L>) -> (CutArcs<L>, Units) {
-        let prisms = self.cluster.lanes::<L>(self.ray.axes);
-        let units = Units::new(&self.prisms.surface);
-        let cut = CutArcs::new(sight, &prisms, &units, &self.ray.splat());
-        (cut, units)
-    }
-
-    /// The arcs that are to be walked in the lanes `met`.
-    #[inline(always)]
-    fn meeting<'s, L: Lanes>(&'s self, cut: &CutArcs<L>, arcs: &'s Arcs, met: u32) -> Meeting<'s> {
-        let found = cut.found(arcs, met, &self.ray.splat());
-        let others = if self.ray.is_usual {
-            found.others | met & self.cluster.folded::<L>()
-        } else {
-            met
-        };
-        Meeting {
-            prisms: self.prisms,
-            cluster: self.cluster,
-            frame: &self.frame,
-            ray: &self.ray,
-            arcs,
-            found: FoundArcs {
-                arcs: found.arcs & !others,
-                others,
+    /// A primitive's base triangle, and the part of it that it is; nothing of it for walls.
+    pub fn part(&self, map: &DisplacementMap, index: u32) -> (u32, TexelBox) {
+        let primitive = self.primitive(index);
+        let triangle = primitive.triangle();
+        let texels = match primitive {
+            Primitive::Block(block) => block.texels(map, self.record(triangle)),
+            Primitive::Whole(_) => TexelBox::EVERYWHERE,
+            Primitive::Walls(_) => TexelBox {
+                low: DVec2::INFINITY,
+                high: DVec2::NEG_INFINITY,
             },
-        }
-    }
-}
-
-/// A cluster with the arcs of a ray through it.
-struct Meeting<'s> {
-    prisms: &'s Prisms,
-    cluster: &'s Cluster,
-    frame: &'s RayFrame,
-    ray: &'s Anchored,
-    arcs: &'s Arcs,
-    found: FoundArcs,
-}
-
-impl Meeting<'_> {
-    /// The ray parameter, from the anchor, at which a lane's arc begins; before all others where that is not known.
-    #[inline(always)]
-    fn begin(&self, lane: usize) -> f32 {
-        if self.found.arcs >> lane & 1 != 0 {
-            self.arcs.ends[0][lane] - self.arcs.time_off[lane]
-        } else {
-            f32::NEG_INFINITY
-        }
+        };
+        (triangle, texels)
     }
 
-    /// The lane among `alive` that begins first.
-    #[inline(always)]
-    fn first(&self, alive: u32) -> usize {
-        let mut best = alive.trailing_zeros() as usize;
-        let mut rest = alive & (alive - 1);
-        while rest != 0 {
-            let lane = rest.trailing_zeros() as usize;
-            rest &= rest - 1;
-            if self.begin(lane) < self.begin(best) {
-                best = lane;
+    pub fn record(&self, triangle: u32) -> &Record {
+        &self.records[triangle as usize]
+    }
+
+    /// Bounds of what a primitive holds of the surface, with room for edits.
+    pub fn bounds(&self, index: u32) -> Aabb {
+        self.boxes[index as usize].get()
+    }
+
+    /// The same for the map as it is.
+    fn bounds_now(
+        &self,
+        surface: &DisplacedSurface,
+        room: Option<(f32, f32)>,
+        index: u32,
+    ) -> Aabb {
+        let primitive = self.primitive(index);
+        let record = self.record(primitive.triangle());
+        let patch = surface.patch(primitive.triangle());
+        match primitive {
+            Primitive::Block(block) => outline(surface, record, block, room),
+            Primitive::Whole(_) => hull(&patch, [0, 1, 2], record.offsets()),
+            Primitive::Walls(triangle) => {
+                let walls = surface.walls_of(triangle).iter();
+                walls.fold(Aabb::EMPTY, |bounds, wall| {
+                    let side = usize::from(wall.side);
+                    let corners = [(side + 1) % 3, (side + 2) % 3];
+                    bounds.union(hull(&patch, corners, record.offsets()))
+                })
             }
         }
-        best
     }
 
-    /// Whether nothing in a lane is before ray parameter `t`.
-    #[inline(always)]
-    fn begins_behind(&self, lane: usize, t: f32) -> bool {
-        let t = (f64::from(t) - self.ray.time) as f32;
-        self.begin(lane) > t + t.abs() * f32::EPSILON
+    /// Takes bounds again after an edit; whether they have grown.
+    pub fn widen(&self, surface: &DisplacedSurface, room: Option<(f32, f32)>, index: u32) -> bool {
+        let bounds = self.bounds_now(surface, room, index);
+        bounds.is_valid() && self.boxes[index as usize].widen(bounds)
     }
 
-    /// The first crossing in a prism, or any.
-    #[inline(always)]
-    fn search<L: Lanes>(&self, problem: &Problem<'_>) -> Option<Found> {
-        if self.found.arcs >> problem.lane & 1 != 0 {
-            search_arc::<L>(problem, self.frame, self.arcs, self.ray.time)
-        } else {
-            L::outline(Search {
-                problem,
-                frame: self.frame,
-            })
-        }
-    }
-
-    #[inline(always)]
-    fn problem(&self, lane: usize, interval: [f32; 2], any: bool) -> Problem<'_> {
-        self.prisms.problem(self.cluster, lane, interval, any)
+    /// The primitives of a base triangle.
+    pub fn primitives_of(&self, triangle: u32) -> impl Iterator<Item = u32> {
+        let first = self.blocks.partition_point(|block| block.triangle < triangle);
+        let blocks = self.blocks[first..].iter();
+        let count = blocks.take_while(|block| block.triangle == triangle).count();
+        let others = |all: &[u32], before: usize| {
+            let found = all.binary_search(&triangle);
+            found.ok().map(|index| (before + index) as u32)
+        };
+        let whole = others(&self.wholes, self.blocks.len());
+        let walls = others(&self.walled, self.blocks.len() + self.wholes.len());
+        (first as u32..(first + count) as u32)
+            .chain(whole)
+            .chain(walls)
     }
 }
 
-/// The first hit on a cluster.
-#[inline(always)]
-pub fn intersect<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray, out: &mut PrismHit) -> bool {
-    out.put(first_hit::<L>(prisms, index, ray))
+/// Conservative bounds of S between some corners of a base triangle: every point is sum b_i (v_i + w n_i) for one w of the range, so it is in the
+/// hull of these; and no further than the largest |D| from the triangle.
+pub fn hull<const N: usize>(patch: &Patch<'_>, corners: [usize; N], offsets: [f32; 2]) -> Aabb {
+    let offsets = offsets.map(f64::from);
+    let (mut hull_min, mut hull_max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for corner in corners {
+        let (v, n) = (patch.vertices[corner], patch.normals[corner]);
+        (min, max) = (min.min(v), max.max(v));
+        for w in offsets {
+            (hull_min, hull_max) = (hull_min.min(v + w * n), hull_max.max(v + w * n));
+        }
+    }
+    // w |N'| = D and |N'| <= 1.
+    let reach = offsets[0].abs().max(offsets[1].abs());
+    Aabb {
+        min: hull_min.max(min - reach).as_vec3(),
+        max: hull_max.min(max + reach).as_vec3(),
+    }
 }
 
-#[inline(always)]
-fn first_hit<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> Option<PrismHit> {
-    let approach = Approach::new(prisms, index, ray)?;
-    let (sight, met) = approach.sight::<L>();
-    if met == 0 {
-        return None;
-    }
-    let (cut, units) = approach.cut(&sight);
-    let arcs = cut.bounded(&units);
-    let meeting = approach.meeting(&cut, &arcs, met);
-    let cluster = meeting.cluster;
-    let mut interval = [ray.tnear, ray.tfar];
-    let mut nearest: Option<(Found, usize)> = None;
-    let mut wall: Option<PrismHit> = None;
-    let mut alive = meeting.found.arcs | meeting.found.others;
-    while alive != 0 {
-        let lane = meeting.first(alive);
-        alive &= !(1 << lane);
-        if meeting.begins_behind(lane, interval[1]) {
-            continue;
+/// A primitive, and where its triangle's corners are, if not where the mesh has them.
+pub struct Asked<'a> {
+    pub prisms: &'a Prisms,
+    pub primitive: u32,
+    pub corners: Option<Corners>,
+}
+
+impl<'a> Asked<'a> {
+    fn patch(&self, triangle: u32) -> Patch<'a> {
+        let surface = &self.prisms.surface;
+        match self.corners {
+            Some(corners) => surface.patch_over(triangle, corners),
+            None => surface.patch(triangle),
         }
-        if let Some(found) = meeting.search::<L>(&meeting.problem(lane, interval, false)) {
-            // Of two at the same t the lower base triangle, whatever the order of the lanes.
-            let beats = nearest.is_none_or(|(best, of)| {
-                let (new, old) = (found.t as f32, best.t as f32);
-                new < old || new == old && cluster.prim(lane) < cluster.prim(of)
-            });
-            if beats {
-                nearest = Some((found, lane));
-                interval[1] = (found.t as f32).next_up().min(ray.tfar);
+    }
+
+    /// The range of w over a triangle that is `patch` now.
+    fn range(&self, record: &Record, patch: &Patch<'_>) -> [f64; 2] {
+        let offsets = match self.corners {
+            Some(_) => {
+                let standing = self.prisms.surface.patch(self.prisms.part(self.primitive).0);
+                patch.offsets_of(standing.displacements_of(record.offsets()))
             }
-        }
-        if cluster.walls(lane) != 0
-            && let Some(found) = walls::<L>(&meeting.problem(lane, interval, false), meeting.frame)
-            && wall.is_none_or(|best| found.is_before(&best))
-        {
-            wall = Some(found);
-            interval[1] = found.t.next_up().min(ray.tfar);
-        }
+            None => record.offsets(),
+        };
+        offsets.map(f64::from)
     }
-    // Of two at the same t the surface.
-    if let Some(wall) = wall
-        && nearest.is_none_or(|(found, _)| wall.t < found.t as f32)
-    {
-        return Some(wall);
-    }
-    let (found, lane) = nearest?;
-    let problem = meeting.problem(lane, interval, false);
-    let hit = hit::<L>(&problem, &found);
-    if problem.spread == 0.0 {
-        return Some(hit);
-    }
-    // What is below the map's heights is inside, unless those go inward.
-    let outside = found.above == (prisms.surface.displacement().scale > 0.0);
-    // In f64: the length of a tiny direction is 0 in f32.
-    let along = ray.direction.as_dvec3().normalize().as_vec3();
-    let ng = turned(hit.ng, if outside { -along } else { along });
-    Some(PrismHit { ng, ..hit })
 }
 
-/// Whether a cluster is hit at all.
+/// The first hit on a primitive.
 #[inline(always)]
-pub fn occluded<L: Lanes>(prisms: &Prisms, index: u32, ray: &Ray) -> bool {
-    let Some(approach) = Approach::new(prisms, index, ray) else {
+pub fn intersect<L: Lanes>(asked: &Asked<'_>, ray: &Ray, out: &mut PrismHit) -> bool {
+    let Parts::Exact(exact) = &asked.prisms.parts else {
         return false;
     };
-    let (sight, met) = approach.sight::<L>();
-    if met == 0 {
-        return false;
-    }
-    let (cut, units) = approach.cut(&sight);
-    let arcs = cut.bounded(&units);
-    let meeting = approach.meeting(&cut, &arcs, met);
-    let mut alive = meeting.found.arcs | meeting.found.others;
-    while alive != 0 {
-        let lane = alive.trailing_zeros() as usize;
-        alive &= alive - 1;
-        let problem = meeting.problem(lane, [ray.tnear, ray.tfar], true);
-        if meeting.search::<L>(&problem).is_some()
-            || meeting.cluster.walls(lane) != 0 && walls::<L>(&problem, meeting.frame).is_some()
-        {
-            return true;
+    let primitive = exact.primitive(asked.primitive);
+    let crossing = match primitive {
+        Primitive::Block(block) => first_in_block::<L>(asked, exact, block, ray, false),
+        Primitive::Whole(_) | Primitive::Walls(_) => {
+            return out.put(L::outline(Others { asked, exact, primitive, ray, any: false }));
         }
-    }
-    false
+    };
+    let Some(crossing) = crossing else { return false };
+    *out = L::outline(Hit { asked, triangle: primitive.triangle(), crossing });
+    true
 }
 
-impl Prisms {
-    #[inline(always)]
-    pub(super) fn problem<'a>(
-        &'a self,
-        cluster: &'a Cluster,
-        lane: usize,
-        interval: [f32; 2],
-        any: bool,
-    ) -> Problem<'a> {
-        Problem {
-            surface: &self.surface,
-            cluster,
-            lane,
-            any,
-            interval,
-            spread: self.spread(),
+/// Whether a primitive is hit at all.
+#[inline(always)]
+pub fn occluded<L: Lanes>(asked: &Asked<'_>, ray: &Ray) -> bool {
+    let Parts::Exact(exact) = &asked.prisms.parts else {
+        return false;
+    };
+    let primitive = exact.primitive(asked.primitive);
+    match primitive {
+        Primitive::Block(block) => {
+            first_in_block::<L>(asked, exact, block, ray, true).is_some()
+        }
+        Primitive::Whole(_) | Primitive::Walls(_) => {
+            L::outline(Others { asked, exact, primitive, ray, any: true }).is_some()
         }
     }
+}
+
+#[inline(always)]
+fn first_in_block<L: Lanes>(
+    asked: &Asked<'_>,
+    exact: &ExactPrisms,
+    block: Block,
+    ray: &Ray,
+    any: bool,
+) -> Option<Crossing> {
+    let record = exact.record(block.triangle);
+    let moved;
+    let record = match asked.corners {
+        None => record,
+        Some(_) => {
+            let patch = asked.patch(block.triangle);
+            let range = asked.range(record, &patch).map(|w| w as f32);
+            moved = Record::new(&patch, record.corner(), range);
+            &moved
+        }
+    };
+    let ask = Ask {
+        surface: &asked.prisms.surface,
+        record,
+        block,
+        corners: asked.corners,
+        any,
+    };
+    nearest::<L>(&ask, ray)
+}
+
+/// What is not a block.
+struct Others<'s, 'a> {
+    asked: &'s Asked<'a>,
+    exact: &'s ExactPrisms,
+    primitive: Primitive,
+    ray: &'s Ray,
+    any: bool,
+}
+
+impl<L: Lanes> Task<L> for Others<'_, '_> {
+    type Output = Option<PrismHit>;
+
+    #[inline(always)]
+    fn run(self) -> Option<PrismHit> {
+        let Self { asked, ray, .. } = self;
+        let triangle = self.primitive.triangle();
+        let patch = asked.patch(triangle);
+        let frame = RayFrame::new(ray, axes(ray));
+        let question = Question {
+            patch: &patch,
+            range: asked.range(self.exact.record(triangle), &patch),
+            frame: &frame,
+            interval: [ray.tnear, ray.tfar],
+            any: self.any,
+        };
+        if let Primitive::Walls(_) = self.primitive {
+            let surface = &asked.prisms.surface;
+            let sides = surface.walls_of(triangle).iter();
+            let sides = sides.fold(0, |bits, wall| bits | 1 << wall.side);
+            return walls::<L>(&question, surface, triangle, sides);
+        }
+        let at = within::<L>(&question, &Cells::ALL)?;
+        Some(hit(&patch, triangle, &Crossing { at, ng: None }))
+    }
+}
+
+struct Hit<'s, 'a> {
+    asked: &'s Asked<'a>,
+    triangle: u32,
+    crossing: Crossing,
+}
+
+impl<L: Lanes> Task<L> for Hit<'_, '_> {
+    type Output = PrismHit;
+
+    #[inline(always)]
+    fn run(self) -> PrismHit {
+        hit(&self.asked.patch(self.triangle), self.triangle, &self.crossing)
+    }
+}
+
+/// The hit on S at a crossing.
+#[inline(always)]
+fn hit(patch: &Patch<'_>, triangle: u32, crossing: &Crossing) -> PrismHit {
+    let Crossing { at: Found { t, u, v }, ng } = *crossing;
+    let ng = ng.unwrap_or_else(|| patch.point(u, v).ng);
+    let mut hit = Root { t, u, v, ng }.to_hit(triangle);
+    if hit.ng == Vec3::ZERO {
+        hit.ng = normal_without_surface(patch);
+    }
+    hit
+}
+
+/// What stands for the normal where opposed vertex normals cancel, or the surface shrinks to a line: the base triangle's, and a
+/// vertex normal where that has no area.
+#[cold]
+fn normal_without_surface(patch: &Patch<'_>) -> Vec3 {
+    let face = patch.face_normal();
+    if face.is_finite() {
+        face
+    } else {
+        patch.normals[0]
+    }
+    .as_vec3()
 }

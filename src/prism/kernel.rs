@@ -6,17 +6,12 @@
 //! only where the machine supports it.
 
 use super::simd::{Portable, SimdLevel};
-use super::{March, PrismHit, Prisms, exact, packet, uniform};
-use crate::ray::{Ray, RayPacket, lanes_of};
+use super::{Asked, March, PrismHit, exact, uniform};
+use crate::ray::Ray;
 
 /// Whether there is a hit, which is written to where the last argument says: most calls are misses, and these leave nothing in memory.
-type Intersect = fn(&Prisms, u32, &Ray, &mut PrismHit) -> bool;
-type Occluded = fn(&Prisms, u32, &Ray) -> bool;
-
-/// Of a packet: hits, and the lanes that are to be asked one by one.
-type Intersect8 = fn(&Prisms, u32, &RayPacket, u8, &mut Hits) -> u8;
-type Occluded8 = fn(&Prisms, u32, &RayPacket, u8) -> [u8; 2];
-type Hits = [Option<PrismHit>; RayPacket::LANES];
+type Intersect = fn(&Asked<'_>, &Ray, &mut PrismHit) -> bool;
+type Occluded = fn(&Asked<'_>, &Ray) -> bool;
 
 /// The chosen hit tests.
 #[derive(Clone, Copy)]
@@ -24,8 +19,6 @@ pub struct Kernel {
     level: SimdLevel,
     intersect: Intersect,
     occluded: Occluded,
-    /// Of marches that know packets.
-    packets: Option<(Intersect8, Occluded8)>,
 }
 
 /// A function of a march for a level: for [`Portable`] lanes, or for AVX2.
@@ -49,22 +42,14 @@ macro_rules! stamped {
     }};
 }
 
-/// The hit tests of a march for single rays.
-macro_rules! single {
+/// The hit tests of a march.
+macro_rules! march {
     ($level:expr, $march:ident) => {
         (
-            stamped!($level, $march::intersect(prisms: &Prisms, prim: u32, ray: &Ray, out: &mut PrismHit) -> bool),
-            stamped!($level, $march::occluded(prisms: &Prisms, prim: u32, ray: &Ray) -> bool),
+            stamped!($level, $march::intersect(asked: &Asked<'_>, ray: &Ray, out: &mut PrismHit) -> bool),
+            stamped!($level, $march::occluded(asked: &Asked<'_>, ray: &Ray) -> bool),
         )
     };
-}
-
-/// Those of the exact march for packets.
-fn packets(level: SimdLevel) -> (Intersect8, Occluded8) {
-    (
-        stamped!(level, packet::intersect(prisms: &Prisms, prim: u32, rays: &RayPacket, valid: u8, hits: &mut Hits) -> u8),
-        stamped!(level, packet::occluded(prisms: &Prisms, prim: u32, rays: &RayPacket, valid: u8) -> [u8; 2]),
-    )
 }
 
 impl Kernel {
@@ -84,7 +69,6 @@ impl Kernel {
             level: SimdLevel::Baseline,
             intersect,
             occluded,
-            packets: None,
         }
     }
 
@@ -96,14 +80,13 @@ impl Kernel {
             SimdLevel::Baseline
         };
         let (intersect, occluded): (Intersect, Occluded) = match march {
-            March::Exact => single!(level, exact),
-            March::Uniform { .. } => single!(level, uniform),
+            March::Exact => march!(level, exact),
+            March::Uniform { .. } => march!(level, uniform),
         };
         Self {
             level,
             intersect,
             occluded,
-            packets: (march == March::Exact).then(|| packets(level)),
         }
     }
 
@@ -112,38 +95,13 @@ impl Kernel {
     }
 
     #[inline]
-    pub fn intersect(&self, prisms: &Prisms, primitive: u32, ray: &Ray) -> Option<PrismHit> {
+    pub fn intersect(&self, asked: &Asked<'_>, ray: &Ray) -> Option<PrismHit> {
         let mut hit = PrismHit::BLANK;
-        (self.intersect)(prisms, primitive, ray, &mut hit).then_some(hit)
+        (self.intersect)(asked, ray, &mut hit).then_some(hit)
     }
 
     #[inline]
-    pub fn occluded(&self, prisms: &Prisms, primitive: u32, ray: &Ray) -> bool {
-        (self.occluded)(prisms, primitive, ray)
-    }
-
-    #[inline]
-    pub fn intersect8(&self, prisms: &Prisms, primitive: u32, rays: &RayPacket, valid: u8) -> Hits {
-        let mut hits = [None; RayPacket::LANES];
-        let alone = match self.packets {
-            Some((intersect, _)) => intersect(prisms, primitive, rays, valid, &mut hits),
-            None => valid,
-        };
-        for lane in lanes_of(alone) {
-            hits[lane] = self.intersect(prisms, primitive, &rays.ray(lane));
-        }
-        hits
-    }
-
-    #[inline]
-    pub fn occluded8(&self, prisms: &Prisms, primitive: u32, rays: &RayPacket, valid: u8) -> u8 {
-        let [mut hit, alone] = match self.packets {
-            Some((_, occluded)) => occluded(prisms, primitive, rays, valid),
-            None => [0, valid],
-        };
-        for lane in lanes_of(alone) {
-            hit |= u8::from(self.occluded(prisms, primitive, &rays.ray(lane))) << lane;
-        }
-        hit
+    pub fn occluded(&self, asked: &Asked<'_>, ray: &Ray) -> bool {
+        (self.occluded)(asked, ray)
     }
 }

@@ -7,26 +7,22 @@
 //! (`sides`); along what is left the surface is looked for (`march`), and the crossing is polished on the
 //! surface's definition ([`crate::surface`]). This room knows no Embree, no scene and no picture.
 
-mod cluster;
+mod block;
 mod curve;
 mod detail;
 mod edits;
 mod exact;
-mod explain;
 mod frame;
-#[allow(dead_code)] // the march goes over to it
 mod judge;
 #[allow(unsafe_code)] // SIMD stamps
 mod kernel;
 mod march;
 mod motion;
-mod packet;
 mod path;
 mod ray_frame;
 #[cfg(test)]
 mod seam_tests;
 mod sides;
-mod sight;
 mod simd;
 mod steps;
 #[cfg(test)]
@@ -37,18 +33,16 @@ mod uniform;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
-use crate::ray::{Aabb, Ray, RayPacket};
-use crate::surface::{ChartEdges, ClosestPoint, DisplacedSurface, PointQuery, Seams, SurfacePoint};
-use cluster::Cluster;
-use exact::ExactPrisms;
+use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
+use crate::surface::{ChartEdges, ClosestPoint, Corners, DisplacedSurface, PointQuery, Seams, SurfacePoint, TexelBox};
+use exact::{Asked, ExactPrisms, hull};
 use kernel::Kernel;
 use uniform::UniformPrisms;
 
 pub use detail::Lod;
 pub use edits::{BoundsChange, EditBounds};
-pub use explain::{CurvePoint, Explanation, Fate, SpanChild};
 pub use march::{March, MarchError, Step};
 pub use motion::MovingPrisms;
 pub use simd::SimdLevel;
@@ -162,7 +156,7 @@ impl Prisms {
         let march = march.validate()?;
         let room = edit_bounds.room(surface.map());
         let parts = match march {
-            March::Exact => Parts::Exact(ExactPrisms::new(&surface, edit_bounds)?),
+            March::Exact => Parts::Exact(ExactPrisms::new(&surface, edit_bounds)),
             March::Uniform { .. } if surface.seams() == Seams::Closed => {
                 return Err(MarchError::SeamsNeedExact);
             }
@@ -184,18 +178,6 @@ impl Prisms {
             room,
             growths: AtomicU64::new(0),
         })
-    }
-
-    /// One cluster alone, of as many prisms, found as these prisms are; without level of detail.
-    fn of_one(&self, cluster: Cluster, prims: usize) -> Self {
-        Self {
-            surface: self.surface.clone(),
-            parts: Parts::Exact(ExactPrisms::of_one(cluster, prims)),
-            charts: None,
-            spread: AtomicU32::new(0),
-            growths: AtomicU64::new(0),
-            ..*self
-        }
     }
 
     /// The same prisms with kernels of a given level (for tests and benches); `None` if this machine lacks it.
@@ -234,7 +216,7 @@ impl Prisms {
     /// Number of primitives that a backend traces. A hit names its base triangle.
     pub fn len(&self) -> usize {
         match &self.parts {
-            Parts::Exact(exact) => exact.clusters.len(),
+            Parts::Exact(exact) => exact.len(),
             Parts::Uniform(uniform) => uniform.records.len(),
         }
     }
@@ -248,7 +230,7 @@ impl Prisms {
     /// seams are closed, and 1 per base triangle for level of detail.
     pub fn bytes(&self) -> usize {
         let prisms = match &self.parts {
-            Parts::Exact(exact) => size_of_val(&exact.clusters[..]),
+            Parts::Exact(exact) => exact.bytes(),
             Parts::Uniform(uniform) => size_of_val(&uniform.records[..]),
         };
         let charts = self.charts.as_ref().map_or(0, ChartEdges::bytes);
@@ -258,56 +240,38 @@ impl Prisms {
     /// Conservative bounds of what one traced primitive holds of the surface.
     pub fn bounds(&self, primitive: u32) -> Aabb {
         let bounds = match &self.parts {
-            Parts::Exact(exact) => {
-                let cluster = &exact.clusters[primitive as usize];
-                (0..exact.len(primitive as usize)).fold(Aabb::EMPTY, |bounds, lane| {
-                    bounds.union(self.prism_bounds(cluster.prim(lane), cluster.offsets(lane)))
-                })
-            }
+            Parts::Exact(exact) => exact.bounds(primitive),
             Parts::Uniform(uniform) => {
-                let record = &uniform.records[primitive as usize];
-                self.prism_bounds(primitive, record.offsets())
+                let offsets = uniform.records[primitive as usize].offsets();
+                hull(&self.surface.patch(primitive), [0, 1, 2], offsets)
             }
         };
         bounds.padded(BOUNDS_ULPS)
-    }
-
-    /// Conservative bounds of the surface over one base triangle: every point is sum b_i (v_i + w n_i) for one w of
-    /// the range, so it is in the hull of six corners; and no further than the largest |D| from the triangle.
-    fn prism_bounds(&self, prim: u32, offsets: [f32; 2]) -> Aabb {
-        let patch = self.surface.patch(prim);
-        let offsets = offsets.map(f64::from);
-        let (mut hull_min, mut hull_max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for (&v, &n) in patch.vertices.iter().zip(&patch.normals) {
-            (min, max) = (min.min(v), max.max(v));
-            for w in offsets {
-                (hull_min, hull_max) = (hull_min.min(v + w * n), hull_max.max(v + w * n));
-            }
-        }
-        // w |N'| = D and |N'| <= 1.
-        let reach = offsets[0].abs().max(offsets[1].abs());
-        Aabb {
-            min: hull_min.max(min - reach).as_vec3(),
-            max: hull_max.min(max + reach).as_vec3(),
-        }
     }
 
     /// The first intersection of `ray` with what one traced primitive holds of the surface, with t in (tnear, tfar).
     /// The ray must be [valid](Ray::is_valid).
     #[inline]
     pub fn intersect(&self, primitive: u32, ray: &Ray) -> Option<PrismHit> {
-        self.kernel.intersect(self, primitive, ray)
+        self.kernel.intersect(&self.asked(primitive, None), ray)
     }
 
     /// Whether there is any.
     #[inline]
     pub fn occluded(&self, primitive: u32, ray: &Ray) -> bool {
-        self.kernel.occluded(self, primitive, ray)
+        self.kernel.occluded(&self.asked(primitive, None), ray)
     }
 
-    /// [`intersect`](Self::intersect) for the lanes whose bits are set in `valid`: their rays must be valid. Rays that go
-    /// the same way are looked at side by side, faster than one by one. Other lanes get `None`.
+    #[inline(always)]
+    fn asked(&self, primitive: u32, corners: Option<Corners>) -> Asked<'_> {
+        Asked {
+            prisms: self,
+            primitive,
+            corners,
+        }
+    }
+
+    /// [`intersect`](Self::intersect) for the lanes whose bits are set in `valid`: their rays must be valid. Other lanes get `None`.
     #[inline]
     pub fn intersect8(
         &self,
@@ -315,26 +279,41 @@ impl Prisms {
         rays: &RayPacket,
         valid: u8,
     ) -> [Option<PrismHit>; RayPacket::LANES] {
-        self.kernel.intersect8(self, primitive, rays, valid)
+        let mut hits = [None; RayPacket::LANES];
+        for lane in lanes_of(valid) {
+            hits[lane] = self.intersect(primitive, &rays.ray(lane));
+        }
+        hits
     }
 
     /// [`occluded`](Self::occluded) for the lanes whose bits are set in `valid`: bit i of the result tells of lane i.
     #[inline]
     pub fn occluded8(&self, primitive: u32, rays: &RayPacket, valid: u8) -> u8 {
-        self.kernel.occluded8(self, primitive, rays, valid)
+        lanes_of(valid)
+            .filter(|&lane| self.occluded(primitive, &rays.ray(lane)))
+            .fold(0, |bits, lane| bits | 1 << lane)
     }
 
-    /// [`DisplacedSurface::closest`] of what one traced primitive holds of the surface: its up to eight base triangles.
+    /// [`DisplacedSurface::closest`] of what one traced primitive holds of the surface.
     pub fn closest(&self, primitive: u32, query: &PointQuery) -> Option<ClosestPoint> {
+        self.surface.closest_in([self.part(primitive)], query)
+    }
+
+    /// The base triangle of a primitive, and the part of it that it is.
+    fn part(&self, primitive: u32) -> (u32, TexelBox) {
         match &self.parts {
-            Parts::Exact(exact) => {
-                let cluster = &exact.clusters[primitive as usize];
-                let lanes = 0..exact.len(primitive as usize);
-                self.surface
-                    .closest(lanes.map(|lane| cluster.prim(lane)), query)
-            }
-            Parts::Uniform(_) => self.surface.closest([primitive], query),
+            Parts::Exact(exact) => exact.part(self.surface.map(), primitive),
+            Parts::Uniform(_) => (primitive, TexelBox::EVERYWHERE),
         }
+    }
+
+    /// A range that holds D over a base triangle, with room for edits.
+    fn displacements(&self, triangle: u32) -> [f64; 2] {
+        let offsets = match &self.parts {
+            Parts::Exact(exact) => exact.record(triangle).offsets(),
+            Parts::Uniform(uniform) => uniform.records[triangle as usize].offsets(),
+        };
+        self.surface.patch(triangle).displacements_of(offsets)
     }
 
     /// [`DisplacedSurface::point`].

@@ -8,12 +8,9 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
-
-use super::simd::LANES;
-use super::{BoundsChange, Lod, March, MarchError, Parts, PrismHit, PrismOptions, Prisms};
+use super::{BoundsChange, Lod, March, MarchError, PrismHit, PrismOptions, Prisms};
 use crate::ray::{Aabb, Ray};
-use crate::surface::{ClosestPoint, MovingSurface, PointQuery, TexelBox, TexelRect};
+use crate::surface::{ClosestPoint, Corners, MovingSurface, PointQuery, TexelBox, TexelRect};
 
 /// A [`MovingSurface`] as a set of prisms, for rays at any time from 0 to 1 ([`Ray::time`]).
 ///
@@ -115,29 +112,12 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.bounds(primitive);
         }
-        let prisms = self.lanes(primitive).filter_map(|(prim, range)| {
-            let whole = TexelBox::EVERYWHERE;
-            self.moving.block_bounds(prim, &whole, range, step)
-        });
-        let bounds = prisms.fold(Aabb::EMPTY, Aabb::union);
-        bounds.padded(super::BOUNDS_ULPS)
-    }
-
-    /// The base triangles of a primitive, and a range that holds D on each.
-    fn lanes(&self, primitive: u32) -> impl Iterator<Item = (u32, [f64; 2])> {
-        let index = primitive as usize;
-        let exact = match &self.prisms.parts {
-            Parts::Exact(exact) => Some(exact),
-            Parts::Uniform(_) => None,
-        };
-        exact.into_iter().flat_map(move |exact| {
-            let cluster = &exact.clusters[index];
-            (0..exact.len(index)).map(|lane| {
-                let prim = cluster.prim(lane);
-                let patch = self.prisms.surface.patch(prim);
-                (prim, patch.displacements_of(cluster.offsets(lane)))
-            })
-        })
+        let (triangle, texels) = self.prisms.part(primitive);
+        let range = self.prisms.displacements(triangle);
+        let of = |texels| self.moving.block_bounds(triangle, texels, range, step);
+        // A block may touch its triangle by a hair less than nothing.
+        let bounds = of(&texels).or_else(|| of(&TexelBox::EVERYWHERE));
+        bounds.unwrap_or(Aabb::EMPTY).padded(super::BOUNDS_ULPS)
     }
 
     /// The first intersection of `ray`, at its time, with what one traced primitive holds of the surface, with t in (tnear, tfar).
@@ -146,7 +126,8 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.intersect(primitive, ray);
         }
-        let hit = self.standing(primitive, ray)?.intersect(0, ray)?;
+        let asked = self.prisms.asked(primitive, Some(self.corners(primitive, ray)));
+        let hit = self.prisms.kernel.intersect(&asked, ray)?;
         // A triangle may have no area for a moment.
         hit.ng.is_finite().then_some(hit)
     }
@@ -156,55 +137,17 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.occluded(primitive, ray);
         }
-        let standing = self.standing(primitive, ray);
-        standing.is_some_and(|prisms| prisms.occluded(0, ray))
+        let asked = self.prisms.asked(primitive, Some(self.corners(primitive, ray)));
+        self.prisms.kernel.occluded(&asked, ray)
     }
 
     /// [`Prisms::closest`] at the query's time.
     pub fn closest(&self, primitive: u32, query: &PointQuery) -> Option<ClosestPoint> {
-        let prims = self.lanes(primitive).map(|(prim, _)| prim);
-        self.moving.closest(prims, query)
+        self.moving.closest_in([self.prisms.part(primitive)], query)
     }
 
-    /// The prisms of one primitive that a ray may meet, as they stand at its time.
-    fn standing(&self, primitive: u32, ray: &Ray) -> Option<Prisms> {
-        let Parts::Exact(exact) = &self.prisms.parts else {
-            return None;
-        };
-        let index = primitive as usize;
-        let cluster = &exact.clusters[index];
-        let (mut met, mut count) = ([0; LANES], 0);
-        for lane in 0..exact.len(index) {
-            let corners = self.moving.positions(cluster.prim(lane), ray.time);
-            let [low, high] = cluster.offsets(lane);
-            // S is no further than |D| <= |w| from the triangle.
-            if may_pass(corners, low.abs().max(high.abs()), ray) {
-                met[count] = lane;
-                count += 1;
-            }
-        }
-        if count == 0 {
-            return None;
-        }
-        let corners = |prim| self.moving.corners(prim, ray.time);
-        let moved = cluster.moved(&self.prisms.surface, &met[..count], corners);
-        Some(self.prisms.of_one(moved, count))
+    /// Where the corners of a primitive's triangle are at a ray's time.
+    fn corners(&self, primitive: u32, ray: &Ray) -> Corners {
+        self.moving.corners(self.prisms.part(primitive).0, ray.time)
     }
-}
-
-/// Whether a ray may pass within `reach` of the box around a triangle.
-fn may_pass(corners: [Vec3; 3], reach: f32, ray: &Ray) -> bool {
-    let around = corners.into_iter().fold(Aabb::EMPTY, Aabb::including);
-    let around = around.padded(super::BOUNDS_ULPS);
-    let (origin, reach) = (ray.origin.as_dvec3(), f64::from(reach) * 1.000_001);
-    let inverse = ray.direction.as_dvec3().recip();
-    let a = (around.min.as_dvec3() - reach - origin) * inverse;
-    let b = (around.max.as_dvec3() + reach - origin) * inverse;
-    // Of rounding.
-    const SLACK: f64 = 1e-12;
-    let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
-    let (tnear, tfar) = (f64::from(ray.tnear), f64::from(ray.tfar));
-    let slack = SLACK * (enter.abs() + leave.abs());
-    // Not what may be NaN: of a ray that starts on a face.
-    !(enter > leave + slack || enter > tfar + slack || leave < tnear - slack)
 }

@@ -10,7 +10,7 @@ use super::march::{March, bent};
 use super::path::{HeightUnits, Path};
 use super::sides::inside;
 use super::simd::{Grid, Lanes};
-use super::{Parts, PrismHit, Prisms};
+use super::{Asked, Parts, PrismHit, Prisms};
 use crate::ray::Ray;
 use crate::surface::DisplacedSurface;
 
@@ -44,14 +44,15 @@ impl UniformPrisms {
 
 /// The first hit over one base triangle.
 #[inline(always)]
-pub fn intersect<L: Lanes>(prisms: &Prisms, prim: u32, ray: &Ray, out: &mut PrismHit) -> bool {
-    out.put(first_root::<L>(prisms, prim, ray).map(|root| root.to_hit(prim)))
+pub fn intersect<L: Lanes>(asked: &Asked<'_>, ray: &Ray, out: &mut PrismHit) -> bool {
+    let prim = asked.primitive;
+    out.put(first_root::<L>(asked.prisms, prim, ray).map(|root| root.to_hit(prim)))
 }
 
 /// Whether there is any.
 #[inline(always)]
-pub fn occluded<L: Lanes>(prisms: &Prisms, prim: u32, ray: &Ray) -> bool {
-    first_root::<L>(prisms, prim, ray).is_some()
+pub fn occluded<L: Lanes>(asked: &Asked<'_>, ray: &Ray) -> bool {
+    first_root::<L>(asked.prisms, asked.primitive, ray).is_some()
 }
 
 #[inline(always)]

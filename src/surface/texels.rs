@@ -35,6 +35,15 @@ impl TexelKind {
             Self::F32 => 1.0,
         }
     }
+
+    /// 1 / [`unit`](Self::unit).
+    pub(crate) fn per_unit(self) -> f32 {
+        match self {
+            Self::U8 => 1.0 / 255.0,
+            Self::U16 => 1.0 / 65535.0,
+            Self::F32 => 1.0,
+        }
+    }
 }
 
 /// `8-bit`, `16-bit` or `float`.
@@ -199,7 +208,6 @@ impl StoredTexels {
     }
 
     /// Texel `index` as stored.
-    #[cfg(test)]
     pub fn get(&self, index: usize) -> f32 {
         match self {
             Self::U8(t) => u8::load(&t[index]).into(),

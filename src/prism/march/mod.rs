@@ -1,7 +1,6 @@
 //! Ways to find the surface along a path, and the root that all of them end in.
 
 pub mod bent;
-pub mod exact;
 pub mod polish;
 pub mod uniform;
 

@@ -1,0 +1,326 @@
+//! The hit test of a block.
+
+use glam::{DVec2, DVec3};
+
+use super::cell::{Verdict, judged};
+use super::cull::met;
+use super::leaf::{Leaf, Rows};
+use super::middle::Heights;
+use super::newton::{Cell, land};
+use super::place::{PART, PARTS, Place};
+use super::view::View;
+use super::{Block, LEAF, Record, SIDE};
+use crate::prism::judge::{Cells, Found, Question, within};
+use crate::prism::ray_frame::{RayFrame, axes};
+use crate::prism::simd::{LANES, Lanes, Task};
+use crate::ray::Ray;
+use crate::surface::{Corners, DisplacedSurface, Patch};
+
+/// A block, and what is asked of it.
+pub struct Ask<'a> {
+    pub surface: &'a DisplacedSurface,
+    pub record: &'a Record,
+    pub block: Block,
+    /// Where the triangle's corners are, if not where the mesh has them.
+    pub corners: Option<Corners>,
+    /// Whether any crossing will do.
+    pub any: bool,
+}
+
+/// A crossing, and dS/du x dS/dv where that is known already.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    pub at: Found,
+    pub ng: Option<DVec3>,
+}
+
+impl Crossing {
+    /// One of which no one asks where it is.
+    const ANY: Self = Self {
+        at: Found {
+            t: 0.0,
+            u: 0.0,
+            v: 0.0,
+        },
+        ng: None,
+    };
+}
+
+/// The nearest crossing of S in a block with t in the ray's interval, or any.
+#[inline(always)]
+pub fn nearest<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> Option<Crossing> {
+    let frame = RayFrame::new(ray, axes(ray));
+    let place = Place::new(ask.surface.map(), ask.record, ask.block);
+    let heights = Heights::new(ask.surface);
+    let mut search = Search {
+        ask,
+        frame: &frame,
+        interval: [ray.tnear, ray.tfar],
+        nearest: None,
+    };
+    let Some(mut view) = View::new::<L>(ask.record, &heights, ask.block, &frame, ray) else {
+        search.decide::<L>(place.all());
+        return search.nearest;
+    };
+    let mut leaves = Leaves::new();
+    leaves.cull::<L>(&place, &view, &heights);
+    while let Some(index) = leaves.first() {
+        if leaves.begins[index] > view.interval[1] {
+            break;
+        }
+        if search.leaf::<L>(&mut view, &heights, &place, &leaves.parts[index]) {
+            break;
+        }
+    }
+    search.nearest
+}
+
+/// The leaves that a ray may meet.
+struct Leaves {
+    begins: [f32; MOST_LEAVES],
+    /// Where, in leaves; and the range of the stored texels.
+    parts: [Part; MOST_LEAVES],
+    count: usize,
+    waiting: u32,
+}
+
+#[derive(Clone, Copy)]
+struct Part {
+    place: [u32; 2],
+    range: [f32; 2],
+}
+
+const MOST_LEAVES: usize = (SIDE / LEAF[0] * (SIDE / LEAF[1])) as usize;
+
+impl Leaves {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            begins: [0.0; MOST_LEAVES],
+            parts: [Part {
+                place: [0; 2],
+                range: [0.0; 2],
+            }; MOST_LEAVES],
+            count: 0,
+            waiting: 0,
+        }
+    }
+
+    /// The leaves that the ray may meet: first the parts of the map's second level, then theirs.
+    #[inline(always)]
+    fn cull<L: Lanes>(&mut self, place: &Place<'_>, view: &View, heights: &Heights) {
+        let (bits, _) = met(view, heights, &place.parts::<L>(&view.middle));
+        let mut waiting = bits & place.there(&PARTS, PART);
+        while waiting != 0 {
+            let one = waiting.trailing_zeros();
+            waiting &= waiting - 1;
+            let other = (waiting != 0).then(|| waiting.trailing_zeros());
+            waiting &= waiting.wrapping_sub(1);
+            let used = if other.is_some() { 0xff } else { 0x0f };
+            let other = other.unwrap_or(one);
+            let places: [[u32; 2]; LANES] = std::array::from_fn(|lane| {
+                let part = if lane < 4 { one } else { other };
+                let lane = lane as u32;
+                [
+                    2 * (part & 1) + (lane & 1),
+                    2 * (part >> 1) + (lane >> 1 & 1),
+                ]
+            });
+            let parts = place.leaves::<L>(&places, &view.middle);
+            let (bits, begins) = met(view, heights, &parts);
+            let bits = bits & place.there(&places, LEAF) & used;
+            self.push(bits, &places, begins.to_array(), [parts.range[0].to_array(), parts.range[1].to_array()]);
+        }
+    }
+
+    #[inline(always)]
+    fn push(
+        &mut self,
+        bits: u32,
+        places: &[[u32; 2]; LANES],
+        begins: [f32; LANES],
+        [low, high]: [[f32; LANES]; 2],
+    ) {
+        let mut bits = bits;
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize % LANES;
+            bits &= bits - 1;
+            let index = self.count % MOST_LEAVES;
+            self.begins[index] = begins[lane];
+            self.parts[index] = Part {
+                place: places[lane],
+                range: [low[lane], high[lane]],
+            };
+            self.waiting |= 1 << index;
+            self.count += 1;
+        }
+    }
+
+    /// Takes the one that begins first.
+    #[inline(always)]
+    fn first(&mut self) -> Option<usize> {
+        if self.waiting == 0 {
+            return None;
+        }
+        let mut best = self.waiting.trailing_zeros() as usize;
+        let mut rest = self.waiting & (self.waiting - 1);
+        while rest != 0 {
+            let index = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            if self.begins[index] < self.begins[best] {
+                best = index;
+            }
+        }
+        self.waiting &= !(1 << best);
+        Some(best)
+    }
+}
+
+/// The search for the nearest crossing.
+struct Search<'a> {
+    ask: &'a Ask<'a>,
+    frame: &'a RayFrame,
+    /// Of ray parameters, open; ends at the nearest crossing so far.
+    interval: [f32; 2],
+    nearest: Option<Crossing>,
+}
+
+impl<'a> Search<'a> {
+    fn patch(&self) -> Patch<'a> {
+        let Ask { surface, block, .. } = *self.ask;
+        match self.ask.corners {
+            Some(corners) => surface.patch_over(block.triangle, corners),
+            None => surface.patch(block.triangle),
+        }
+    }
+
+    /// Looks at a leaf's cells; whether nothing more is wanted.
+    #[inline(always)]
+    fn leaf<L: Lanes>(
+        &mut self,
+        view: &mut View,
+        heights: &Heights,
+        place: &Place<'_>,
+        part: &Part,
+    ) -> bool {
+        let [i, j] = [0, 1].map(|k: usize| part.place[k] * LEAF[k]);
+        let [s, t] = place.from_middle(&view.middle, [i, j], LEAF);
+        let Some(leaf) = Leaf::new(view, heights, s, t) else {
+            self.decide::<L>(place.part(i, j));
+            return self.ask.any && self.nearest.is_some();
+        };
+        let rise = (part.range[1] - part.range[0]) * heights.scale.abs();
+        match place.stored(i, j) {
+            Some(texels) => self.cells::<L>(view, heights, place, &leaf, rise, [i, j], &texels),
+            None => {
+                let texels = place.continued(i, j);
+                self.cells::<L>(view, heights, place, &leaf, rise, [i, j], &texels)
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn cells<L: Lanes>(&mut self, view: &mut View, heights: &Heights, place: &Place<'_>, leaf: &Leaf, rise: f32, [i, j]: [u32; 2], texels: &impl Rows) -> bool {
+        let mut cells = leaf.cells::<L>(view, heights, rise, texels) & place.mask(i, j);
+        while cells != 0 {
+            let bit = cells.trailing_zeros();
+            cells &= cells - 1;
+            let at = (bit & 7, bit >> 3);
+            let stored = texels.corners(at);
+            let [h00, h10, h01, h11] = stored;
+            match judged(view, heights, leaf, at, [h00, h10, h11, h01]) {
+                Verdict::Missed => {}
+                Verdict::Hit { is_inside, .. } if is_inside && self.ask.any => {
+                    self.nearest = Some(Crossing::ANY);
+                    return true;
+                }
+                verdict => {
+                    let cell = [
+                        place.first[0] + i64::from(i + at.0),
+                        place.first[1] + i64::from(j + at.1),
+                    ];
+                    L::outline(Look {
+                        search: self,
+                        verdict,
+                        cell,
+                        stored,
+                    });
+                    view.end_at(self.interval[1]);
+                    if self.ask.any && self.nearest.is_some() {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Decides a rectangle of cells in f64.
+    #[inline(always)]
+    fn decide<L: Lanes>(&mut self, cells: Cells) {
+        let patch = self.patch();
+        let range = self.ask.record.offsets().map(f64::from);
+        let question = Question {
+            patch: &patch,
+            range,
+            frame: self.frame,
+            interval: self.interval,
+            any: self.ask.any,
+        };
+        if let Some(at) = within::<L>(&question, &cells) {
+            self.take(Crossing { at, ng: None });
+        }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, crossing: Crossing) {
+        let t = crossing.at.t as f32;
+        if t > self.interval[0] && t < self.interval[1] {
+            self.nearest = Some(crossing);
+            self.interval[1] = t;
+        }
+    }
+}
+
+/// A cell that f32 cannot say "missed" of.
+struct Look<'s, 'a> {
+    search: &'s mut Search<'a>,
+    verdict: Verdict,
+    cell: [i64; 2],
+    stored: [f32; 4],
+}
+
+impl<L: Lanes> Task<L> for Look<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { search, cell, .. } = self;
+        if let Verdict::Hit { at, .. } = self.verdict {
+            let patch = search.patch();
+            let per_unit = 1.0 / f64::from(patch.map.unit());
+            let cell = Cell {
+                corner: DVec2::new(cell[0] as f64, cell[1] as f64),
+                heights: self.stored.map(|h| f64::from(h) * per_unit),
+            };
+            if let Some(found) = land(&patch, search.frame, &cell, at) {
+                // Roundings of f64 are a millionth of this.
+                const NEAR: f64 = 1e-9;
+                let Found { u, v, .. } = found.at;
+                let least = u.min(v).min(1.0 - u - v);
+                if least > NEAR {
+                    search.take(found);
+                }
+                if least.abs() > NEAR {
+                    return;
+                }
+            }
+        }
+        let one = |k: usize| [cell[k]; 2];
+        search.decide::<L>(Cells {
+            x: one(0),
+            y: one(1),
+        });
+    }
+}
+

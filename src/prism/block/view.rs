@@ -1,0 +1,156 @@
+//! A block seen along a ray.
+//!
+//! Moved along the ray to the plane through the ray's origin (sheared, not turned: the main axis is the one along which the direction is
+//! largest), every point has two lateral coordinates, and the ray's own are 0. Lateral coordinates and the ray parameter t are linear in space, so P and N'
+//! are affine functions of texel coordinates in them too. The lateral axes are turned so that N' at the block's middle is along the
+//! first: the range of heights is seen along one axis only.
+//!
+//! Texel coordinates (s, t) are from the block's middle, ray parameters from there as well. The ray's way to the block is in
+//! f64, so that what rounding leaves depends on the block's size and not on the distance.
+
+use super::middle::{Axis, Heights, Middle};
+use super::{Block, ROUNDING, Record};
+use crate::prism::ray_frame::RayFrame;
+use crate::prism::simd::Lanes;
+use crate::ray::Ray;
+
+/// See the module.
+pub struct View {
+    /// Lateral axes.
+    pub x: Axis,
+    pub y: Axis,
+    /// Ray parameter.
+    pub z: Axis,
+    /// In space.
+    pub middle: Middle,
+    /// By how much roundings may move a point sideways, and along the ray.
+    pub noise: f32,
+    pub depth_noise: f32,
+    /// Lateral coordinates of a vector are at most this times its length.
+    pub shear: f32,
+    /// Lengths along the ray in ray parameters.
+    pub per_length: f32,
+    /// Ray parameter of the block's middle.
+    pub time: f64,
+    /// tnear and tfar from there, not narrower; all of space where `is_usual` is false.
+    pub interval: [f32; 2],
+    /// The same, not wider: what is between is in the interval also when its ray parameter is rounded. Empty where `is_usual` is false.
+    pub inner: [f32; 2],
+    is_usual: bool,
+}
+
+/// Directions beyond this and its inverse would overflow ray parameters in f32.
+const LONGEST: f64 = 1e12;
+
+/// Beyond this products would overflow.
+const LARGEST: f32 = 1e15;
+
+impl View {
+    /// `None` where f32 will not do.
+    #[inline(always)]
+    pub fn new<L: Lanes>(
+        record: &Record,
+        heights: &Heights,
+        block: Block,
+        frame: &RayFrame,
+        ray: &Ray,
+    ) -> Option<Self> {
+        let middle = Middle::new(record, block, heights);
+        let [ds, dt] = middle.from();
+        let [ax, ay, az] = frame.axes;
+        let (wx, wy, wz) = (record.along(ax), record.along(ay), record.along(az));
+
+        // P at the middle, in f64.
+        let (s, t) = (f64::from(ds), f64::from(dt));
+        let from = |w: &[f32; 8], origin: f64| {
+            (f64::from(w[0]) - origin) + (s * f64::from(w[1]) + t * f64::from(w[2]))
+        };
+        let depth = from(wz, frame.origin[2]);
+        let u0 = (from(wx, frame.origin[0]) - frame.shear[0] * depth) as f32;
+        let v0 = (from(wy, frame.origin[1]) - frame.shear[1] * depth) as f32;
+        let time = depth * frame.per_depth;
+        let is_usual = {
+            let length = frame.per_depth.abs();
+            length < LONGEST && length > 1.0 / LONGEST
+        };
+        let per_depth = if is_usual { frame.per_depth as f32 } else { 1.0 };
+        let all = [f32::NEG_INFINITY, f32::INFINITY];
+        let (interval, inner) = if is_usual {
+            (
+                [before(ray.tnear, time), behind(ray.tfar, time)],
+                [after(ray.tnear, time), -after(-ray.tfar, -time)],
+            )
+        } else {
+            (all, [all[1], all[0]])
+        };
+
+        // The six vectors side by side, from the side.
+        let shear = [frame.shear[0] as f32, frame.shear[1] as f32];
+        let lz = L::from_array(*wz);
+        let u = lz.neg_mul_add(L::splat(shear[0]), L::from_array(*wx));
+        let v = lz.neg_mul_add(L::splat(shear[1]), L::from_array(*wy));
+        let (ua, va) = (u.to_array(), v.to_array());
+        let (nu, nv) = (middle.axis(&ua).n.c, middle.axis(&va).n.c);
+        let length = (nu * nu + nv * nv).sqrt();
+        let (cos, sin) = if length > f32::MIN_POSITIVE {
+            (nu / length, nv / length)
+        } else {
+            (1.0, 0.0)
+        };
+        let x = u.mul_add(L::splat(cos), v * L::splat(sin)).to_array();
+        let y = u.neg_mul_add(L::splat(sin), v * L::splat(cos)).to_array();
+        let size = u0.abs() + v0.abs() + middle.size;
+        let is_sound = middle.is_tame() && size < LARGEST && time.abs() < 1e30;
+        let view = Self {
+            x: middle.axis(&x).from(u0 * cos + v0 * sin, 1.0),
+            y: middle.axis(&y).from(v0 * cos - u0 * sin, 1.0),
+            z: middle.axis(wz).from(0.0, per_depth),
+            noise: rounding(size),
+            depth_noise: per_depth.abs() * rounding(middle.size),
+            middle,
+            shear: (1.0 + shear[0] * shear[0] + shear[1] * shear[1]).sqrt() * (1.0 + 1e-6),
+            per_length: per_depth.abs(),
+            time,
+            interval,
+            inner,
+            is_usual,
+        };
+        is_sound.then_some(view)
+    }
+
+    /// Ends the interval at `t`.
+    #[inline(always)]
+    pub fn end_at(&mut self, t: f32) {
+        if self.is_usual {
+            self.interval[1] = behind(t, self.time);
+            self.inner[1] = -after(-t, -self.time);
+        }
+    }
+}
+
+/// What roundings may move a point of S that vectors of this length in all lead to: few enough follow one another.
+#[inline(always)]
+pub fn rounding(size: f32) -> f32 {
+    32.0 * ROUNDING * size
+}
+
+/// A ray parameter from another, not farther.
+#[inline(always)]
+fn before(t: f32, time: f64) -> f32 {
+    let t = (f64::from(t) - time) as f32;
+    t - t.abs() * f32::EPSILON
+}
+
+/// The same, farther by what rounding a ray parameter moves it.
+#[inline(always)]
+fn after(t: f32, time: f64) -> f32 {
+    let from = f64::from(t) - time;
+    (from + 2.0 * f64::from(f32::EPSILON) * (from.abs() + time.abs())) as f32
+}
+
+/// The same, not nearer.
+#[inline(always)]
+fn behind(t: f32, time: f64) -> f32 {
+    let t = (f64::from(t) - time) as f32;
+    t + t.abs() * f32::EPSILON
+}
