@@ -36,16 +36,20 @@ impl<Q: Quad> Hull<Q> {
         ];
         // A is 1 in the middle of the curve.
         let least = areas[0].min(areas[1].min(areas[2])).to_array()[0];
-        (least > 0.0).then_some(Self {
-            places: [
-                places[0] / areas[0],
-                places[1] / areas[1],
-                places[2] / areas[2],
-            ],
-            depths,
-            w: [curve.w(a), curve.w(b)],
-            per_depth: curve.per_depth,
-        })
+        if least > 0.0 {
+            Some(Self {
+                places: [
+                    places[0] / areas[0],
+                    places[1] / areas[1],
+                    places[2] / areas[2],
+                ],
+                depths,
+                w: [curve.w(a), curve.w(b)],
+                per_depth: curve.per_depth,
+            })
+        } else {
+            None
+        }
     }
 
     /// The least and the most texel coordinates, from the curve's texel base.

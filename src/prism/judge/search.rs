@@ -201,9 +201,12 @@ impl<'a> Search<'a> {
         while count > 0 && !self.done {
             self.count();
             let end = ahead[count - 1];
-            let is_straight =
-                || Hull::new(curve, [from, end]).is_some_and(|hull| hull.is_straight(patch));
-            if count <= DEPTH && !is_straight() {
+            // No closure: lanes must not pass through functions that lack the kernel's instruction set.
+            let is_straight = match Hull::new(curve, [from, end]) {
+                Some(hull) => hull.is_straight(patch),
+                None => false,
+            };
+            if count <= DEPTH && !is_straight {
                 ahead[count] = 0.5 * (from + end);
                 count += 1;
                 continue;
@@ -264,7 +267,11 @@ impl<L: Lanes<Quad = Q>, Q: Quad> Task<L> for Along<'_, '_, Q> {
         }
         let whole = [0.0, 1.0];
         let [x, y] = curve.texel_base;
-        if Hull::new(curve, whole).is_none_or(|hull| !search.leaves_out(&hull, [x, y])) {
+        let is_left_out = match Hull::new(curve, whole) {
+            Some(hull) => search.leaves_out(&hull, [x, y]),
+            None => false,
+        };
+        if !is_left_out {
             let lines = [[x0 - x, x1 - x + 1.0], [y0 - y, y1 - y + 1.0]];
             search.parts(curve, &lines, whole, &mut 0.0);
         }
