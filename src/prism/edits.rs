@@ -101,8 +101,7 @@ impl Prisms {
                     let corners = around(self.surface.corner_texcoords(triangle));
                     // Walls look at the map elsewhere too.
                     let has_walls = !self.surface.walls_of(triangle).is_empty();
-                    if touch.misses(corners) && !has_walls
-                        || !self.surface.overlaps(triangle, rect)
+                    if touch.misses(corners) && !has_walls || !self.surface.overlaps(triangle, rect)
                     {
                         continue;
                     }

@@ -178,12 +178,7 @@ impl ExactPrisms {
     }
 
     /// The same for the map as it is.
-    fn bounds_now(
-        &self,
-        surface: &DisplacedSurface,
-        room: Option<(f32, f32)>,
-        index: u32,
-    ) -> Aabb {
+    fn bounds_now(&self, surface: &DisplacedSurface, room: Option<(f32, f32)>, index: u32) -> Aabb {
         let primitive = self.primitive(index);
         let record = self.record(primitive.triangle());
         let patch = surface.patch(primitive.triangle());
@@ -209,9 +204,13 @@ impl ExactPrisms {
 
     /// The primitives of a base triangle.
     pub fn primitives_of(&self, triangle: u32) -> impl Iterator<Item = u32> {
-        let first = self.blocks.partition_point(|block| block.triangle < triangle);
+        let first = self
+            .blocks
+            .partition_point(|block| block.triangle < triangle);
         let blocks = self.blocks[first..].iter();
-        let count = blocks.take_while(|block| block.triangle == triangle).count();
+        let count = blocks
+            .take_while(|block| block.triangle == triangle)
+            .count();
         let others = |all: &[u32], before: usize| {
             let found = all.binary_search(&triangle);
             found.ok().map(|index| (before + index) as u32)
@@ -265,7 +264,10 @@ impl<'a> Asked<'a> {
     fn range(&self, record: &Record, patch: &Patch<'_>) -> [f64; 2] {
         let offsets = match self.corners {
             Some(_) => {
-                let standing = self.prisms.surface.patch(self.prisms.part(self.primitive).0);
+                let standing = self
+                    .prisms
+                    .surface
+                    .patch(self.prisms.part(self.primitive).0);
                 patch.offsets_of(standing.displacements_of(record.offsets()))
             }
             None => record.offsets(),
@@ -284,11 +286,23 @@ pub fn intersect<L: Lanes>(asked: &Asked<'_>, ray: &Ray, out: &mut PrismHit) -> 
     let crossing = match primitive {
         Primitive::Block(block) => first_in_block::<L>(asked, exact, block, ray, false),
         Primitive::Whole(_) | Primitive::Walls(_) => {
-            return out.put(L::outline(Others { asked, exact, primitive, ray, any: false }));
+            return out.put(L::outline(Others {
+                asked,
+                exact,
+                primitive,
+                ray,
+                any: false,
+            }));
         }
     };
-    let Some(crossing) = crossing else { return false };
-    *out = L::outline(Hit { asked, triangle: primitive.triangle(), crossing });
+    let Some(crossing) = crossing else {
+        return false;
+    };
+    *out = L::outline(Hit {
+        asked,
+        triangle: primitive.triangle(),
+        crossing,
+    });
     true
 }
 
@@ -300,12 +314,15 @@ pub fn occluded<L: Lanes>(asked: &Asked<'_>, ray: &Ray) -> bool {
     };
     let primitive = exact.primitive(asked.primitive);
     match primitive {
-        Primitive::Block(block) => {
-            first_in_block::<L>(asked, exact, block, ray, true).is_some()
-        }
-        Primitive::Whole(_) | Primitive::Walls(_) => {
-            L::outline(Others { asked, exact, primitive, ray, any: true }).is_some()
-        }
+        Primitive::Block(block) => first_in_block::<L>(asked, exact, block, ray, true).is_some(),
+        Primitive::Whole(_) | Primitive::Walls(_) => L::outline(Others {
+            asked,
+            exact,
+            primitive,
+            ray,
+            any: true,
+        })
+        .is_some(),
     }
 }
 
@@ -385,14 +402,21 @@ impl<L: Lanes> Task<L> for Hit<'_, '_> {
 
     #[inline(always)]
     fn run(self) -> PrismHit {
-        hit(&self.asked.patch(self.triangle), self.triangle, &self.crossing)
+        hit(
+            &self.asked.patch(self.triangle),
+            self.triangle,
+            &self.crossing,
+        )
     }
 }
 
 /// The hit on S at a crossing.
 #[inline(always)]
 fn hit(patch: &Patch<'_>, triangle: u32, crossing: &Crossing) -> PrismHit {
-    let Crossing { at: Found { t, u, v }, ng } = *crossing;
+    let Crossing {
+        at: Found { t, u, v },
+        ng,
+    } = *crossing;
     let ng = ng.unwrap_or_else(|| patch.point(u, v).ng);
     let mut hit = Root { t, u, v, ng }.to_hit(triangle);
     if hit.ng == Vec3::ZERO {

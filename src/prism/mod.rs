@@ -36,7 +36,9 @@ use std::sync::atomic::{AtomicU32, AtomicU64};
 use glam::Vec3;
 
 use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
-use crate::surface::{ChartEdges, ClosestPoint, Corners, DisplacedSurface, PointQuery, Seams, SurfacePoint, TexelBox};
+use crate::surface::{
+    ChartEdges, ClosestPoint, Corners, DisplacedSurface, PointQuery, Seams, SurfacePoint, TexelBox,
+};
 use exact::{Asked, ExactPrisms, hull};
 use kernel::Kernel;
 use uniform::UniformPrisms;

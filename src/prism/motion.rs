@@ -126,7 +126,9 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.intersect(primitive, ray);
         }
-        let asked = self.prisms.asked(primitive, Some(self.corners(primitive, ray)));
+        let asked = self
+            .prisms
+            .asked(primitive, Some(self.corners(primitive, ray)));
         let hit = self.prisms.kernel.intersect(&asked, ray)?;
         // A triangle may have no area for a moment.
         hit.ng.is_finite().then_some(hit)
@@ -137,7 +139,9 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.occluded(primitive, ray);
         }
-        let asked = self.prisms.asked(primitive, Some(self.corners(primitive, ray)));
+        let asked = self
+            .prisms
+            .asked(primitive, Some(self.corners(primitive, ray)));
         self.prisms.kernel.occluded(&asked, ray)
     }
 

@@ -48,12 +48,7 @@ pub fn judged(
     let b1 = view.middle.b[0].c + s * view.middle.b[0].s + t * view.middle.b[0].t;
     let b2 = view.middle.b[1].c + s * view.middle.b[1].s + t * view.middle.b[1].t;
     let b0 = 1.0 - b1 - b2;
-    let most = Vec4::new(
-        b0.max_element(),
-        b1.max_element(),
-        b2.max_element(),
-        0.0,
-    );
+    let most = Vec4::new(b0.max_element(), b1.max_element(), b2.max_element(), 0.0);
     // Digits of f32 barycentrics over a few thousand texels.
     const SLACK: f32 = 1e-3;
     if most.min_element() < -SLACK {
@@ -193,9 +188,17 @@ fn root([ax, bx, dx, cx]: [f32; 4], [ay, by, dy, cy]: [f32; 4]) -> [f32; 2] {
     let outside = |p: f32| (p - 0.5).abs();
     let (near, far) = (q0 / q, q / q2);
     // NaN is no place.
-    let p = if outside(far) < outside(near) { far } else { near };
+    let p = if outside(far) < outside(near) {
+        far
+    } else {
+        near
+    };
     let (hx, hy) = (fx + p * gx, fy + p * gy);
     let (kx, ky) = (ax + p * ex, ay + p * ey);
-    let q = if hx.abs() > hy.abs() { -kx / hx } else { -ky / hy };
+    let q = if hx.abs() > hy.abs() {
+        -kx / hx
+    } else {
+        -ky / hy
+    };
     [p.clamp(0.0, 1.0), q.clamp(0.0, 1.0)]
 }

@@ -48,7 +48,9 @@ impl<L: Lanes> Offsets<L> {
         let n = axis.n.lanes(parts.s, parts.t);
         let c = self.w.mul_add(n, axis.p.lanes(parts.s, parts.t));
         let flat = L::splat(axis.p.reach(parts.half) + noise);
-        let bent = self.farthest.mul_add(L::splat(axis.n.reach(parts.half)), flat);
+        let bent = self
+            .farthest
+            .mul_add(L::splat(axis.n.reach(parts.half)), flat);
         [c, self.reach.mul_add(n.abs(), bent)]
     }
 }
@@ -83,6 +85,9 @@ pub fn met<L: Lanes>(view: &View, heights: &Heights, parts: &Parts<L>) -> (u32, 
     let begins = z - off_z;
     let behind = begins - L::splat(view.interval[1]);
     let before = L::splat(view.interval[0]) - (z + off_z);
-    let out = beside.max(behind).max(before).max(beyond(parts, &view.middle.b));
+    let out = beside
+        .max(behind)
+        .max(before)
+        .max(beyond(parts, &view.middle.b));
     (!above(out) & 0xff, begins)
 }

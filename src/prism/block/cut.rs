@@ -113,7 +113,11 @@ fn turn(patch: &Patch<'_>, block: DVec2) -> f64 {
     let change = 0.5 * (block.x * across.length() + block.y * up.length());
     // A block's middle may lie outside the triangle by as much.
     let least = patch.shortest_normal() - change;
-    if least > 0.0 { change / least } else { f64::INFINITY }
+    if least > 0.0 {
+        change / least
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// A triangle of texel coordinates, against boxes of cells.
@@ -124,7 +128,9 @@ struct Outline {
 
 impl Outline {
     fn new(corners: [DVec2; 3]) -> Self {
-        let size = corners.iter().fold(0.0f64, |s, p| s.max(p.abs().max_element()));
+        let size = corners
+            .iter()
+            .fold(0.0f64, |s, p| s.max(p.abs().max_element()));
         Self {
             corners,
             slack: 1e-6 + 1e-7 * size,

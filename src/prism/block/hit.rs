@@ -129,7 +129,12 @@ impl Leaves {
             let parts = place.leaves::<L>(&places, &view.middle);
             let (bits, begins) = met(view, heights, &parts);
             let bits = bits & place.there(&places, LEAF) & used;
-            self.push(bits, &places, begins.to_array(), [parts.range[0].to_array(), parts.range[1].to_array()]);
+            self.push(
+                bits,
+                &places,
+                begins.to_array(),
+                [parts.range[0].to_array(), parts.range[1].to_array()],
+            );
         }
     }
 
@@ -220,7 +225,16 @@ impl<'a> Search<'a> {
     }
 
     #[inline(always)]
-    fn cells<L: Lanes>(&mut self, view: &mut View, heights: &Heights, place: &Place<'_>, leaf: &Leaf, rise: f32, [i, j]: [u32; 2], texels: &impl Rows) -> bool {
+    fn cells<L: Lanes>(
+        &mut self,
+        view: &mut View,
+        heights: &Heights,
+        place: &Place<'_>,
+        leaf: &Leaf,
+        rise: f32,
+        [i, j]: [u32; 2],
+        texels: &impl Rows,
+    ) -> bool {
         let mut cells = leaf.cells::<L>(view, heights, rise, texels) & place.mask(i, j);
         while cells != 0 {
             let bit = cells.trailing_zeros();
@@ -323,4 +337,3 @@ impl<L: Lanes> Task<L> for Look<'_, '_> {
         });
     }
 }
-

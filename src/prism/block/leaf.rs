@@ -36,12 +36,16 @@ impl Leaf {
     #[inline(always)]
     pub fn new(view: &View, heights: &Heights, s: f32, t: f32) -> Option<Self> {
         let normal = view.middle.normal.at(s, t);
-        let [a, b] = [normal.dot(view.middle.normal.s), normal.dot(view.middle.normal.t)];
+        let [a, b] = [
+            normal.dot(view.middle.normal.s),
+            normal.dot(view.middle.normal.t),
+        ];
         let [aa, bb] = view.middle.spread.map(|n| n * n);
         let per_squared = 1.0 / normal.length_squared();
         let k = per_squared.sqrt();
         let (k3, k5) = (k * per_squared, k * per_squared * per_squared);
-        let x = (HALF[0] * view.middle.spread[0] + HALF[1] * view.middle.spread[1]) * k * (1.0 + 1e-5);
+        let x =
+            (HALF[0] * view.middle.spread[0] + HALF[1] * view.middle.spread[1]) * k * (1.0 + 1e-5);
         let least = 1.0 - x;
         // The terms of the series from the third on, of which each is below the last times x.
         let remainder = x * x * x / least;

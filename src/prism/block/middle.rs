@@ -61,7 +61,10 @@ impl Axis {
             t: a.t * scale,
         };
         Self {
-            p: Affine { c, ..scaled(self.p) },
+            p: Affine {
+                c,
+                ..scaled(self.p)
+            },
             n: scaled(self.n),
         }
     }
@@ -183,9 +186,7 @@ impl Middle {
             },
             k_off: k * turn * turn / least + 1e-6 * k,
             least,
-            size: far_s * sum(p_s)
-                + far_t * sum(p_t)
-                + heights.most * k / least * along_normals,
+            size: far_s * sum(p_s) + far_t * sum(p_t) + heights.most * k / least * along_normals,
         }
     }
 

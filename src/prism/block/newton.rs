@@ -131,8 +131,7 @@ impl Seen {
         let [x, y, z] = frame.axes;
         let [shear_x, shear_y] = frame.shear;
         let [ox, oy, oz] = frame.origin;
-        let lateral =
-            |p: DVec3| DVec2::new(p[x] - p[z] * shear_x, p[y] - p[z] * shear_y);
+        let lateral = |p: DVec3| DVec2::new(p[x] - p[z] * shear_x, p[y] - p[z] * shear_y);
         let depth = v0[z] - oz;
         Self {
             vertices: [

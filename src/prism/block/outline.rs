@@ -46,9 +46,7 @@ pub fn outline(
         }
         let offsets = Offsets::new(&parts, &heights, &middle.k, middle.k_off);
         for axis in 0..3 {
-            let [middle, off] = offsets
-                .along(&parts, &axes[axis], noise)
-                .map(L::to_array);
+            let [middle, off] = offsets.along(&parts, &axes[axis], noise).map(L::to_array);
             for lane in (0..LANES).filter(|lane| used >> lane & 1 != 0) {
                 bounds.min[axis] = bounds.min[axis].min(middle[lane] - off[lane]);
                 bounds.max[axis] = bounds.max[axis].max(middle[lane] + off[lane]);
@@ -57,4 +55,3 @@ pub fn outline(
     }
     bounds
 }
-

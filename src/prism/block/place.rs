@@ -31,7 +31,11 @@ impl<'m> Place<'m> {
         let along = |k: usize, n: usize| {
             let n = n as i64;
             let inside = first[k] >= 0 && first[k] < n;
-            let stored = if inside { first[k] } else { first[k].rem_euclid(n) };
+            let stored = if inside {
+                first[k]
+            } else {
+                first[k].rem_euclid(n)
+            };
             let is_stored = inside || map.wrap() == Wrap::Repeat;
             (stored, (n - stored).min(SIDE.into()) as u32, is_stored)
         };
@@ -113,10 +117,7 @@ impl<'m> Place<'m> {
         if let (Some([x, y]), Some(level)) = (self.stored, levels.get(level)) {
             let width = level.width() as u32;
             let base = y as u32 / size[1] * width + x as u32 / size[0] + level.offset() as u32;
-            return L::entries(
-                level.entries(),
-                places.map(|[i, j]| base + j * width + i),
-            );
+            return L::entries(level.entries(), places.map(|[i, j]| base + j * width + i));
         }
         let mut ranges = [[0.0; LANES]; 2];
         for (lane, place) in places.iter().enumerate() {
@@ -234,7 +235,10 @@ impl Place<'_> {
     pub fn part(&self, i: u32, j: u32) -> Cells {
         let along = |k: usize, from: u32| {
             let to = (from + LEAF[k]).min(self.count[k]);
-            [self.first[k] + i64::from(from), self.first[k] + i64::from(to) - 1]
+            [
+                self.first[k] + i64::from(from),
+                self.first[k] + i64::from(to) - 1,
+            ]
         };
         Cells {
             x: along(0, i),

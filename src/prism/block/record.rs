@@ -41,7 +41,11 @@ pub const BEFORE: i64 = 16;
 fn above(x: f32) -> u32 {
     let bits = x.to_bits();
     let half = bits >> 16;
-    if x > 0.0 && bits & 0xffff != 0 { half + 1 } else { half }
+    if x > 0.0 && bits & 0xffff != 0 {
+        half + 1
+    } else {
+        half
+    }
 }
 
 /// Both of a range in one word.
@@ -51,7 +55,10 @@ fn packed([low, high]: [f32; 2]) -> u32 {
 }
 
 fn unpacked(bits: u32) -> [f32; 2] {
-    [f32::from_bits(bits & 0xffff_0000), f32::from_bits(bits << 16)]
+    [
+        f32::from_bits(bits & 0xffff_0000),
+        f32::from_bits(bits << 16),
+    ]
 }
 
 impl Record {
@@ -150,7 +157,9 @@ impl Record {
             let [a, b] = unpacked(bits);
             (low < a || high > b).then(|| packed([a.min(low), b.max(high)]))
         };
-        let widened = self.offsets.fetch_update(Ordering::Relaxed, Ordering::Relaxed, wider);
+        let widened = self
+            .offsets
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, wider);
         widened.is_ok()
     }
 }

@@ -32,9 +32,7 @@ impl Random {
 
 /// A triangle of some size in texels, with leaning normals, over a rough map.
 fn surface(random: &mut Random, texels: f32, lean: f32, wrap: Wrap) -> DisplacedSurface {
-    let corner = |random: &mut Random| {
-        (Vec3::Z + lean * random.vector()).normalize()
-    };
+    let corner = |random: &mut Random| (Vec3::Z + lean * random.vector()).normalize();
     let (width, height) = (
         40 + (random.next() * 60.0) as usize,
         40 + (random.next() * 60.0) as usize,
@@ -42,7 +40,11 @@ fn surface(random: &mut Random, texels: f32, lean: f32, wrap: Wrap) -> Displaced
     let st = Vec2::new(random.next(), random.next()) * 2.0 - 0.5;
     let across = Vec2::new(texels / width as f32, texels / height as f32);
     let builder = MeshBuilder {
-        positions: vec![Vec3::ZERO, Vec3::new(1.0, 0.1, 0.0), Vec3::new(0.2, 0.9, 0.1)],
+        positions: vec![
+            Vec3::ZERO,
+            Vec3::new(1.0, 0.1, 0.0),
+            Vec3::new(0.2, 0.9, 0.1),
+        ],
         normals: vec![corner(random), corner(random), corner(random)],
         texcoords: vec![
             st,
@@ -79,7 +81,11 @@ fn blocks_have_what_the_judge_has() {
         };
         for _ in 0..50 {
             let (u, v) = (random.next(), random.next());
-            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            let (u, v) = if u + v > 1.0 {
+                (1.0 - u, 1.0 - v)
+            } else {
+                (u, v)
+            };
             let to = patch.point(u.into(), v.into()).position.as_vec3();
             let direction = (random.vector() + Vec3::new(0.0, 0.0, -0.3)).normalize();
             let ray = Ray::new(to - 2.0 * direction, direction);
@@ -111,7 +117,12 @@ fn blocks_have_what_the_judge_has() {
                 faults += 1;
                 if faults < 12 {
                     let texel = truth.map(|f| patch.texel(f.u, f.v));
-                    println!("{k} {wrap:?} {texels} {lean}: {t} {best} at {texel:?} of {:?} {:?} {:?}", surface.map().size(), patch.texels, blocks);
+                    println!(
+                        "{k} {wrap:?} {texels} {lean}: {t} {best} at {texel:?} of {:?} {:?} {:?}",
+                        surface.map().size(),
+                        patch.texels,
+                        blocks
+                    );
                 }
             }
             if let Some(found) = truth {

@@ -73,7 +73,11 @@ impl View {
             let length = frame.per_depth.abs();
             length < LONGEST && length > 1.0 / LONGEST
         };
-        let per_depth = if is_usual { frame.per_depth as f32 } else { 1.0 };
+        let per_depth = if is_usual {
+            frame.per_depth as f32
+        } else {
+            1.0
+        };
         let all = [f32::NEG_INFINITY, f32::INFINITY];
         let (interval, inner) = if is_usual {
             (
