@@ -96,6 +96,7 @@ impl Prisms {
         let touch = Touch::new(map, rect);
         match &self.parts {
             Parts::Exact(exact) => {
+                exact.take_heights(&self.surface, self.room);
                 let triangles = self.surface.mesh().triangles().len() as u32;
                 for triangle in 0..triangles {
                     let corners = around(self.surface.corner_texcoords(triangle));

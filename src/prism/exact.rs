@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::block::{Ask, Block, Crossing, Cutter, Record, nearest, outline};
+use super::block::{Ask, Block, Crossing, Cutter, Heights, Record, nearest, outline};
 use super::edits::EditBounds;
 use super::judge::{Cells, Found, Question, walls, within};
 use super::march::polish::Root;
@@ -29,6 +29,9 @@ pub struct ExactPrisms {
     walled: Vec<u32>,
     /// By primitive.
     boxes: Vec<StoredBox>,
+    /// What texels mean, when the prisms were made; and bits of the largest |D| since.
+    heights: Heights,
+    most: AtomicU32,
 }
 
 /// What a primitive is.
@@ -89,7 +92,10 @@ impl ExactPrisms {
             wholes: Vec::new(),
             walled: Vec::new(),
             boxes: Vec::new(),
+            heights: Heights::new(surface),
+            most: AtomicU32::new(0),
         };
+        made.take_heights(surface, room);
         for triangle in 0..count {
             let patch = surface.patch(triangle);
             let offsets = bounds.offsets(surface, triangle);
@@ -121,6 +127,23 @@ impl ExactPrisms {
             made.boxes.push(StoredBox::new(bounds));
         }
         made
+    }
+
+    /// What texels mean.
+    #[inline(always)]
+    fn heights(&self) -> Heights {
+        Heights {
+            most: f32::from_bits(self.most.load(Ordering::Relaxed)),
+            ..self.heights
+        }
+    }
+
+    /// Takes note of what heights the map has by now.
+    pub fn take_heights(&self, surface: &DisplacedSurface, room: Option<(f32, f32)>) {
+        let heights = Heights::new(surface).with_room(room, surface.map().unit());
+        // Bits of positive floats are in their order.
+        self.most
+            .fetch_max(heights.most.to_bits(), Ordering::Relaxed);
     }
 
     /// Number of primitives.
@@ -347,6 +370,7 @@ fn first_in_block<L: Lanes>(
     };
     let ask = Ask {
         surface: &asked.prisms.surface,
+        heights: exact.heights(),
         record,
         block,
         corners: asked.corners,

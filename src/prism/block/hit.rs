@@ -19,6 +19,7 @@ use crate::surface::{Corners, DisplacedSurface, Patch};
 /// A block, and what is asked of it.
 pub struct Ask<'a> {
     pub surface: &'a DisplacedSurface,
+    pub heights: Heights,
     pub record: &'a Record,
     pub block: Block,
     /// Where the triangle's corners are, if not where the mesh has them.
@@ -51,17 +52,18 @@ impl Crossing {
 pub fn nearest<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> Option<Crossing> {
     let frame = RayFrame::new(ray, axes(ray));
     let place = Place::new(ask.surface.map(), ask.record, ask.block);
-    let heights = Heights::new(ask.surface);
+    let heights = ask.heights;
     let mut search = Search {
         ask,
         frame: &frame,
         interval: [ray.tnear, ray.tfar],
         nearest: None,
     };
-    let Some(mut view) = View::new::<L>(ask.record, &heights, ask.block, &frame, ray) else {
+    let mut view = View::new::<L>(ask.record, &heights, ask.block, &frame, ray);
+    if !view.is_sound {
         search.decide::<L>(place.all());
         return search.nearest;
-    };
+    }
     let mut leaves = Leaves::new::<L>(&place, &view, &heights);
     while let Some(leaf) = leaves.first() {
         if leaves.begin(leaf) > view.interval[1] {

@@ -25,6 +25,7 @@ mod view;
 
 pub use cut::{Cutter, Whole};
 pub use hit::{Ask, Crossing, nearest};
+pub use middle::Heights;
 pub use outline::outline;
 pub use record::{Block, Record};
 

@@ -69,32 +69,31 @@ impl<'m> Place<'m> {
     /// Parts of the block, each of two by two leaves.
     #[inline(always)]
     pub fn parts<L: Lanes>(&self, middle: &Middle) -> Parts<L> {
-        self.some(1, PART, [0, 4], &PARTS, middle)
+        let [s, t] = self.from_middle(middle, [0; 2], PART);
+        Parts {
+            s: L::splat(s) + L::from_array([0.0, 16.0, 0.0, 16.0, 0.0, 16.0, 0.0, 16.0]),
+            t: L::splat(t) + L::from_array([0.0, 0.0, 8.0, 8.0, 16.0, 16.0, 24.0, 24.0]),
+            half: [8.0, 4.0],
+            range: self.ranges(1, PART, [0, 4], || PARTS),
+        }
     }
 
     /// The leaves of two parts.
     #[inline(always)]
-    pub fn leaves<L: Lanes>(&self, parts: [u32; 2], middle: &Middle) -> Parts<L> {
-        let numbers = parts.map(|part| 4 * part as usize);
-        self.some(0, LEAF, numbers, &leaves_of(parts), middle)
-    }
-
-    #[inline(always)]
-    fn some<L: Lanes>(
-        &self,
-        level: usize,
-        size: [u32; 2],
-        numbers: [usize; 2],
-        places: &[[u32; 2]; LANES],
-        middle: &Middle,
-    ) -> Parts<L> {
-        let first = self.from_middle(middle, [0; 2], size);
-        let along = |k: usize| places.map(|place| (place[k] * size[k]) as f32);
+    pub fn leaves<L: Lanes>(&self, [a, b]: [u32; 2], middle: &Middle) -> Parts<L> {
+        let [s, t] = self.from_middle(middle, [0; 2], LEAF);
+        let (across, up) = (PART[0] as f32, PART[1] as f32);
+        let (sa, sb) = (s + (a & 1) as f32 * across, s + (b & 1) as f32 * across);
+        let (ta, tb) = (t + (a >> 1) as f32 * up, t + (b >> 1) as f32 * up);
         Parts {
-            s: L::from_array(along(0)) + L::splat(first[0]),
-            t: L::from_array(along(1)) + L::splat(first[1]),
-            half: size.map(|n| n as f32 / 2.0),
-            range: self.ranges(level, size, numbers, places),
+            s: L::from_array([sa, sa, sa, sa, sb, sb, sb, sb])
+                + L::from_array([0.0, 8.0, 0.0, 8.0, 0.0, 8.0, 0.0, 8.0]),
+            t: L::from_array([ta, ta, ta, ta, tb, tb, tb, tb])
+                + L::from_array([0.0, 0.0, 4.0, 4.0, 0.0, 0.0, 4.0, 4.0]),
+            half: super::leaf::HALF,
+            range: self.ranges(0, LEAF, [4 * a as usize, 4 * b as usize], || {
+                leaves_of([a, b])
+            }),
         }
     }
 
@@ -118,15 +117,15 @@ impl<'m> Place<'m> {
         &self,
         level: usize,
         size: [u32; 2],
-        numbers: [usize; 2],
-        places: &[[u32; 2]; LANES],
+        [a, b]: [usize; 2],
+        places: impl Fn() -> [[u32; 2]; LANES],
     ) -> [L; 2] {
         let levels = self.map.pyramid().levels();
         if let (Some([x, y]), Some(level)) = (self.stored, levels.get(level)) {
             let tile = level.tile(x / SIDE as usize, y / SIDE as usize);
-            return L::pairs(level.entries(), numbers.map(|number| tile + number));
+            return L::pairs(level.entries(), [tile + a, tile + b]);
         }
-        self.continued_ranges(size, places)
+        self.continued_ranges(size, &places())
     }
 
     /// The same wherever the block lies.

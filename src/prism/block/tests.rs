@@ -103,6 +103,7 @@ fn blocks_have_what_the_judge_has() {
             for &block in &blocks {
                 let ask = Ask {
                     surface: &surface,
+                    heights: Heights::new(&surface),
                     record: &record,
                     block,
                     corners: None,

@@ -37,6 +37,8 @@ pub struct View {
     /// The same, not wider: what is between is in the interval also when its ray parameter is rounded. Empty where `is_usual` is false.
     pub inner: [f32; 2],
     is_usual: bool,
+    /// Whether f32 will do.
+    pub is_sound: bool,
 }
 
 /// Directions beyond this and its inverse would overflow ray parameters in f32.
@@ -46,7 +48,7 @@ const LONGEST: f64 = 1e12;
 const LARGEST: f32 = 1e15;
 
 impl View {
-    /// `None` where f32 will not do.
+    /// Of use where [`is_sound`](Self::is_sound).
     #[inline(always)]
     pub fn new<L: Lanes>(
         record: &Record,
@@ -54,7 +56,7 @@ impl View {
         block: Block,
         frame: &RayFrame,
         ray: &Ray,
-    ) -> Option<Self> {
+    ) -> Self {
         let middle = Middle::new::<L>(record, block, heights);
         let [ds, dt] = middle.from();
         let [ax, ay, az] = frame.axes;
@@ -104,22 +106,21 @@ impl View {
         let x = u.mul_add(L::splat(cos), v * L::splat(sin)).to_array();
         let y = u.neg_mul_add(L::splat(sin), v * L::splat(cos)).to_array();
         let size = u0.abs() + v0.abs() + middle.size;
-        let is_sound = middle.is_tame() && size < LARGEST && time.abs() < 1e30;
-        let view = Self {
+        Self {
             x: middle.axis(&x).from(u0 * cos + v0 * sin, 1.0),
             y: middle.axis(&y).from(v0 * cos - u0 * sin, 1.0),
             z: middle.axis(wz).from(0.0, per_depth),
             noise: rounding(size),
             depth_noise: per_depth.abs() * rounding(middle.size),
-            middle,
             shear: (1.0 + shear[0] * shear[0] + shear[1] * shear[1]).sqrt() * (1.0 + 1e-6),
             per_length: per_depth.abs(),
             time,
             interval,
             inner,
+            is_sound: middle.is_tame() && size < LARGEST && time.abs() < 1e30,
             is_usual,
-        };
-        is_sound.then_some(view)
+            middle,
+        }
     }
 
     /// Ends the interval at `t`.
