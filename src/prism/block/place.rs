@@ -86,6 +86,7 @@ impl<'m> Place<'m> {
         places: &[[u32; 2]; LANES],
         middle: &Middle,
     ) -> Parts<L> {
+        L::step();
         let first = self.from_middle(middle, [0; 2], size);
         let along = |k: usize| places.map(|place| (place[k] * size[k]) as f32);
         Parts {
