@@ -13,6 +13,7 @@ mod curve;
 mod detail;
 mod edits;
 mod exact;
+mod explain;
 mod frame;
 mod judge;
 #[allow(unsafe_code)] // SIMD stamps
@@ -46,6 +47,9 @@ use uniform::UniformPrisms;
 
 pub use detail::Lod;
 pub use edits::{BoundsChange, EditBounds};
+pub use explain::{
+    BlockTold, CellFate, CellTold, Explanation, Fate, LeafTold, PartTold, PathPoint,
+};
 pub use march::{March, MarchError, Step};
 pub use motion::MovingPrisms;
 pub use simd::SimdLevel;

@@ -1,5 +1,7 @@
 //! The hit test of a block.
 
+mod explain;
+
 use glam::{DVec2, DVec3};
 
 use super::cell::{Verdict, judged};
@@ -15,6 +17,8 @@ use crate::prism::ray_frame::{RayFrame, axes};
 use crate::prism::simd::{LANES, Lanes, Task};
 use crate::ray::Ray;
 use crate::surface::{Corners, DisplacedSurface, Patch};
+
+pub use explain::told;
 
 /// A block, and what is asked of it.
 pub struct Ask<'a> {

@@ -24,7 +24,7 @@ mod tests;
 mod view;
 
 pub use cut::{Cutter, Whole};
-pub use hit::{Ask, Crossing, nearest};
+pub use hit::{Ask, Crossing, nearest, told};
 pub use outline::outline;
 pub use record::{Block, Record};
 
