@@ -254,7 +254,7 @@ impl Figure<'_> {
         );
         self.over_the_map(&mut svg);
         self.along_the_ray(&mut svg);
-        self.from_the_side(&mut svg);
+        self.along_the_path(&mut svg);
         svg.push_str("</svg>\n");
         svg
     }
@@ -294,7 +294,7 @@ impl Figure<'_> {
             40.0,
             48.0,
             13.0,
-            "The base triangle in texel coordinates, and the ray's path.",
+            "The base triangle in texel coordinates; red: the ray's path.",
         );
         let ends = blocks.iter().flat_map(|block| block.texels);
         let panel = Panel::square(ends, [40.0, 60.0, 440.0]).unstretched();
@@ -422,7 +422,7 @@ impl Figure<'_> {
     }
 
     /// Heights along the path.
-    fn from_the_side(&self, svg: &mut String) {
+    fn along_the_path(&self, svg: &mut String) {
         text(svg, 40.0, 610.0, 17.0, "3. From the side");
         text(
             svg,
