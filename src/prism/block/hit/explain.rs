@@ -2,7 +2,7 @@
 
 use glam::{DVec2, Vec4};
 
-use super::{Ask, Leaves, Part, Search};
+use super::{Ask, Leaves, Search};
 use crate::prism::block::LEAF;
 use crate::prism::block::cell::{Verdict, judged};
 use crate::prism::block::cull::met;
@@ -44,54 +44,46 @@ pub fn told<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> (BlockTold, Option<Found>) {
     let (bits, _) = met(&view, &heights, &parts);
     let ranges = parts.range.map(L::to_array);
     let are_there = place.there(&PARTS, PART);
-    let mut leaves = Leaves::new();
-    leaves.cull::<L>(&place, &view, &heights);
     let per_unit = 1.0 / f64::from(map.unit());
-    for (k, at) in PARTS
-        .iter()
-        .enumerate()
-        .filter(|(k, _)| are_there >> k & 1 != 0)
-    {
-        let is_met = bits >> k & 1 != 0;
-        told.parts.push(PartTold {
-            texels: texels(place.rectangle([at[0] * PART[0], at[1] * PART[1]], PART)),
-            heights: ranges.map(|range| f64::from(range[k]) * per_unit),
-            fate: if is_met { Fate::Entered } else { Fate::Missed },
-        });
-        // What is left of a part's leaves comes below, in the order in which the march takes it.
-        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let at = [2 * at[0] + i, 2 * at[1] + j];
-            let is_left = leaves.parts[..leaves.count]
-                .iter()
-                .any(|left| left.place == at);
-            let is_there = place.there(&[at; LANES], LEAF) != 0;
-            if is_met && is_there && !is_left {
-                let [x, y] = [at[0] * LEAF[0], at[1] * LEAF[1]];
-                let texels = texels(place.rectangle([x, y], LEAF));
-                let range = place.leaves::<L>(&[at; LANES], &view.middle).range;
-                told.leaves.push(LeafTold::unseen(PartTold {
-                    texels,
-                    heights: range.map(|range| f64::from(range.to_array()[0]) * per_unit),
-                    fate: Fate::Missed,
-                }));
-            }
+    for (k, at) in PARTS.iter().enumerate() {
+        if are_there >> k & 1 != 0 {
+            let is_met = bits >> k & 1 != 0;
+            told.parts.push(PartTold {
+                texels: texels(place.rectangle([at[0] * PART[0], at[1] * PART[1]], PART)),
+                heights: ranges.map(|range| f64::from(range[k]) * per_unit),
+                fate: if is_met { Fate::Entered } else { Fate::Missed },
+            });
         }
     }
 
-    while let Some(index) = leaves.first() {
-        let part = leaves.parts[index];
-        let [i, j] = [0, 1].map(|k: usize| part.place[k] * LEAF[k]);
-        let mut leaf = LeafTold::unseen(PartTold {
-            texels: texels(place.part(i, j)),
-            heights: part.range.map(|h| f64::from(h) * per_unit),
-            fate: Fate::Behind,
-        });
-        if leaves.begins[index] <= view.interval[1] {
-            leaf.part.fate = Fate::Judged;
-            seen::<L>(&view, &heights, &place, &part, &mut leaf);
-            search.leaf::<L>(&mut view, &heights, &place, &part);
+    let mut leaves = Leaves::new::<L>(&place, &view, &heights);
+    let part_told = |leaves: &Leaves, leaf: usize, fate: Fate| {
+        let [i, j] = leaves.place(leaf);
+        PartTold {
+            texels: texels(place.part(i * LEAF[0], j * LEAF[1])),
+            heights: [0, 1]
+                .map(|k: usize| f64::from(leaves.range[k].as_flattened()[leaf]) * per_unit),
+            fate,
         }
-        told.leaves.push(leaf);
+    };
+    // Four of each part that was met.
+    for leaf in 0..4 * (bits & are_there).count_ones() as usize {
+        let is_there = place.there(&[leaves.place(leaf); LANES], LEAF) != 0;
+        if is_there && leaves.waiting >> leaf & 1 == 0 {
+            let part = part_told(&leaves, leaf, Fate::Missed);
+            told.leaves.push(LeafTold::unseen(part));
+        }
+    }
+    while let Some(leaf) = leaves.first() {
+        let mut leaf_told = LeafTold::unseen(part_told(&leaves, leaf, Fate::Behind));
+        if leaves.begin(leaf) <= view.interval[1] {
+            let at = leaves.place(leaf);
+            let rise = leaves.rise(leaf) * heights.scale.abs();
+            leaf_told.part.fate = Fate::Judged;
+            seen::<L>(&view, &heights, &place, at, rise, &mut leaf_told);
+            search.leaf::<L>(&mut view, &heights, &place, at, rise);
+        }
+        told.leaves.push(leaf_told);
     }
     (told, search.nearest.map(|crossing| crossing.at))
 }
@@ -109,10 +101,11 @@ fn seen<L: Lanes>(
     view: &View,
     heights: &Heights,
     place: &Place<'_>,
-    part: &Part,
+    at: [u32; 2],
+    rise: f32,
     told: &mut LeafTold,
 ) {
-    let [i, j] = [0, 1].map(|k: usize| part.place[k] * LEAF[k]);
+    let [i, j] = [at[0] * LEAF[0], at[1] * LEAF[1]];
     let [s, t] = place.from_middle(&view.middle, [i, j], LEAF);
     let Some(leaf) = Leaf::new(view, heights, s, t) else {
         return;
@@ -129,7 +122,6 @@ fn seen<L: Lanes>(
                 .push(vertex(view, heights, &leaf, [column, row], stored));
         }
     }
-    let rise = (part.range[1] - part.range[0]) * heights.scale.abs();
     let mut cells = leaf.cells::<L>(view, heights, rise, &rows) & place.mask(i, j);
     while cells != 0 {
         let bit = cells.trailing_zeros();
