@@ -1,12 +1,14 @@
-//! Draws docs/images/march.svg, the exact march of one ray through one prism: `cargo run --release --example march_figure`.
+//! Draws docs/images/march.svg, the exact march of one ray over one base triangle: `cargo run --release --example march_figure`.
 //!
 //! What is drawn is what the march says it did ([`Prisms::explain`]); only the map and the ray were chosen.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
-use prismarch::prism::{Explanation, Fate, March, Prisms, SpanChild};
+use glam::{DVec2, Vec2, Vec3};
+use prismarch::prism::{
+    BlockTold, CellFate, Explanation, Fate, LeafTold, March, PathPoint, Prisms,
+};
 use prismarch::ray::Ray;
 use prismarch::surface::{
     DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Texels, Wrap,
@@ -25,16 +27,21 @@ fn main() -> std::io::Result<()> {
 /// The figure, as SVG.
 pub fn draw() -> String {
     let prisms = prisms();
-    let explanation = prisms.explain(0, &ray()).expect("the ray is inside once");
-    Figure::new(prisms.surface().map(), &explanation).svg()
+    let explanation = prisms.explain(0, &ray()).expect("a triangle with blocks");
+    let map = prisms.surface().map();
+    Figure {
+        map,
+        explanation: &explanation,
+    }
+    .svg()
 }
 
 /// Grazes the first hills and meets the next.
 pub fn ray() -> Ray {
-    Ray::new(Vec3::new(-0.25, 0.16, 0.165), Vec3::new(1.3, 0.26, -0.095))
+    Ray::new(Vec3::new(-0.25, 0.16, 0.175), Vec3::new(1.3, 0.26, -0.125))
 }
 
-/// One base triangle whose normals lean apart, so that the ray's curve over the map is bent.
+/// One base triangle whose normals lean apart, so that the ray's path over the map is bent.
 pub fn prisms() -> Prisms {
     let builder = MeshBuilder {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(0.5, 0.85, 0.0)],
@@ -43,7 +50,11 @@ pub fn prisms() -> Prisms {
             Vec3::new(0.45, -0.2, 1.0).normalize(),
             Vec3::new(0.0, 0.4, 1.0).normalize(),
         ],
-        texcoords: vec![Vec2::ZERO, Vec2::X, Vec2::new(0.5, 0.85)],
+        texcoords: vec![
+            Vec2::new(0.02, 0.03),
+            Vec2::new(0.42, 0.05),
+            Vec2::new(0.2, 0.38),
+        ],
         triangles: vec![[0, 1, 2]],
     };
     let (mesh, _) = builder.build(NormalMode::File).expect("a sound triangle");
@@ -61,7 +72,7 @@ pub fn prisms() -> Prisms {
 
 /// Hills, and lesser hills on them: sums and products alone, so that every machine has the same.
 fn height(x: u32, y: u32) -> u16 {
-    let octaves = [(64, 0.62), (32, 0.2), (8, 0.12), (2, 0.06)];
+    let octaves = [(32, 0.58), (16, 0.2), (8, 0.12), (4, 0.07), (2, 0.03)];
     let sum: f64 = octaves
         .iter()
         .map(|&(cell, part)| part * hills(x, y, cell))
@@ -89,27 +100,14 @@ fn hills(x: u32, y: u32, cell: u32) -> f64 {
     row(j) + fy * (row(j + 1) - row(j))
 }
 
-/// A point of the curve: how many texels along, the ray's height and the surface's.
-#[derive(Clone, Copy)]
-struct Place {
-    t: f64,
-    along: f64,
-    ray: f64,
-    surface: f64,
-}
-
 struct Figure<'a> {
-    places: Vec<Place>,
-    /// Texels along at which the curve crosses a texel line.
-    lines: Vec<f64>,
+    map: &'a DisplacementMap,
     explanation: &'a Explanation,
 }
 
 /// A part of the plane, and where it is drawn.
 struct Panel {
-    /// Texels along.
     x: [f64; 2],
-    /// Heights.
     y: [f64; 2],
     left: f64,
     top: f64,
@@ -118,288 +116,403 @@ struct Panel {
 }
 
 const INK: &str = "#2b2b33";
+const RAY: &str = "#b3123f";
+const GROUND: &str = "#7a6748";
 
-/// Fill, outline and name of a child by its fate.
-fn look(fate: Fate) -> (&'static str, &'static str, &'static str) {
+/// Fill and outline of a part by its fate.
+fn look(fate: Fate) -> (&'static str, &'static str) {
     match fate {
-        Fate::Skipped => ("#a9cbe8", "#4c86b8", "skipped: above or below all there"),
-        Fate::Cut => ("#f7d98a", "#c29416", "cut again"),
-        Fate::Walked => ("#f2a07b", "#c2542a", "walked cell by cell"),
-        Fate::Behind => ("#dededf", "#a5a5ab", "behind the hit: left"),
+        Fate::Missed => ("#c3dbef", "#7ba3c8"),
+        Fate::Entered => ("#f2a07b", "#c2542a"),
+        Fate::Judged => ("#c9a6e4", "#7d4bb0"),
+        Fate::Behind => ("#dededf", "#a5a5ab"),
+    }
+}
+
+/// The same of a cell.
+fn look_of_cell(fate: CellFate) -> (&'static str, &'static str) {
+    match fate {
+        CellFate::Missed => ("#f7d98a", "kept by its box, then certainly missed"),
+        CellFate::Hit => ("#f2a07b", "certainly hit: Newton lands it"),
+        CellFate::Judged => ("#c9a6e4", "left to the judge"),
     }
 }
 
 impl Panel {
-    fn x(&self, along: f64) -> f64 {
-        self.left + self.width * (along - self.x[0]) / (self.x[1] - self.x[0])
+    /// A square around some points.
+    fn square(points: impl Iterator<Item = DVec2>, [left, top, size]: [f64; 3]) -> Self {
+        let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let (low, high) = points.fold(start, |(l, h), p| (l.min(p), h.max(p)));
+        let (middle, half) = (0.5 * (low + high), 0.53 * (high - low));
+        Self {
+            x: [middle.x - half.x, middle.x + half.x],
+            y: [middle.y - half.y, middle.y + half.y],
+            left,
+            top,
+            width: size,
+            height: size,
+        }
     }
 
-    fn y(&self, height: f64) -> f64 {
-        self.top + self.height * (self.y[1] - height) / (self.y[1] - self.y[0])
+    /// As high as wide in its own units.
+    fn unstretched(self) -> Self {
+        let half = 0.5 * (self.x[1] - self.x[0]).max(self.y[1] - self.y[0]);
+        let around = |[low, high]: [f64; 2]| {
+            let middle = 0.5 * (low + high);
+            [middle - half, middle + half]
+        };
+        Self {
+            x: around(self.x),
+            y: around(self.y),
+            ..self
+        }
     }
 
-    fn holds(&self, along: f64) -> bool {
-        (self.x[0]..=self.x[1]).contains(&along)
+    fn x(&self, x: f64) -> f64 {
+        self.left + self.width * (x - self.x[0]) / (self.x[1] - self.x[0])
+    }
+
+    fn y(&self, y: f64) -> f64 {
+        self.top + self.height * (self.y[1] - y) / (self.y[1] - self.y[0])
+    }
+
+    fn polygon(&self, svg: &mut String, points: &[DVec2], style: &str) {
+        let mut list = String::new();
+        for p in points {
+            let _ = write!(list, "{:.1},{:.1} ", self.x(p.x), self.y(p.y));
+        }
+        let _ = writeln!(svg, "<polygon points=\"{}\" {style}/>", list.trim_end());
+    }
+
+    fn rectangle(&self, svg: &mut String, [low, high]: [DVec2; 2], style: &str) {
+        let (left, top) = (self.x(low.x), self.y(high.y));
+        let (width, height) = (self.x(high.x) - left, self.y(low.y) - top);
+        let _ = writeln!(
+            svg,
+            "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" {style}/>"
+        );
+    }
+
+    fn line(&self, svg: &mut String, points: impl Iterator<Item = DVec2>, style: &str) {
+        let mut list = String::new();
+        for p in points {
+            let _ = write!(list, "{:.1},{:.1} ", self.x(p.x), self.y(p.y));
+        }
+        let _ = writeln!(
+            svg,
+            "<polyline points=\"{}\" fill=\"none\" {style}/>",
+            list.trim_end()
+        );
+    }
+
+    /// What is drawn until `</g>` stays inside.
+    fn clip(&self, svg: &mut String, name: &str) {
+        let Self {
+            left,
+            top,
+            width,
+            height,
+            ..
+        } = self;
+        let _ = writeln!(
+            svg,
+            "<clipPath id=\"{name}\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/></clipPath>\n\
+             <g clip-path=\"url(#{name})\">"
+        );
+    }
+
+    fn frame(&self, svg: &mut String) {
+        let Self {
+            left,
+            top,
+            width,
+            height,
+            ..
+        } = self;
+        let _ = writeln!(
+            svg,
+            "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"none\" stroke=\"{INK}\"/>"
+        );
+    }
+
+    fn ring(&self, svg: &mut String, at: DVec2) {
+        let _ = writeln!(
+            svg,
+            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"5\" fill=\"#ffffff\" stroke=\"{RAY}\" stroke-width=\"2.5\"/>",
+            self.x(at.x),
+            self.y(at.y)
+        );
     }
 }
 
-impl<'a> Figure<'a> {
-    fn new(map: &DisplacementMap, explanation: &'a Explanation) -> Self {
-        let (mut places, mut lines, mut along) = (Vec::new(), Vec::new(), 0.0);
-        let mut last = explanation.curve[0].texel;
-        for point in &explanation.curve {
-            let step = point.texel.distance(last);
-            for (a, b) in last.to_array().into_iter().zip(point.texel.to_array()) {
-                if a.floor() != b.floor() {
-                    let line = a.floor().max(b.floor());
-                    lines.push(along + step * (line - a) / (b - a));
-                }
-            }
-            along += step;
-            last = point.texel;
-            places.push(Place {
-                t: point.t,
-                along,
-                ray: point.height,
-                surface: map.sample(point.texel).height,
-            });
-        }
-        Self {
-            places,
-            lines,
-            explanation,
-        }
-    }
-
-    /// The place on the curve at ray parameter `t`.
-    fn at(&self, t: f64) -> Place {
-        let next = self.places.partition_point(|p| p.t < t);
-        let next = next.clamp(1, self.places.len() - 1);
-        let (a, b) = (self.places[next - 1], self.places[next]);
-        let part = ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0);
-        let mix = |a: f64, b: f64| a + part * (b - a);
-        Place {
-            t,
-            along: mix(a.along, b.along),
-            ray: mix(a.ray, b.ray),
-            surface: mix(a.surface, b.surface),
-        }
-    }
-
+impl Figure<'_> {
     fn svg(&self) -> String {
-        let deepest = self
-            .explanation
-            .children
-            .iter()
-            .map(|c| c.depth)
-            .max()
-            .unwrap_or(0);
-        let hit = self.at(self.explanation.hit.expect("the ray hits"));
-        let whole = Panel {
-            x: [0.0, self.places[self.places.len() - 1].along],
-            y: [-0.02, 1.02],
-            left: 60.0,
-            top: 64.0,
-            width: 880.0,
-            height: 250.0,
-        };
-        // Close up: from the first child that was cut to the one with the hit.
-        let is_cut = |c: &&SpanChild| c.depth == 0 && c.fate == Fate::Cut;
-        let mut cut = self.explanation.children.iter().filter(is_cut);
-        let first = cut.next().expect("a child was cut");
-        let last = cut.next_back().unwrap_or(first);
-        let x = [first.t[0], last.t[1]].map(|t| self.at(t).along);
-        let inside = self
-            .places
-            .iter()
-            .filter(|p| x[0] <= p.along && p.along <= x[1]);
-        let heights = inside.flat_map(|p| [p.ray, p.surface]).chain(first.heights);
-        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
-        let zoomed = Panel {
-            x,
-            y: [low - 0.02, high + 0.02],
-            left: 60.0,
-            top: 392.0,
-            width: 880.0,
-            height: 250.0,
-        };
         let mut svg = String::from(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 1000 748\" \
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 1000 940\" \
              font-family=\"Helvetica, Arial, sans-serif\" font-size=\"13\">\n\
-             <rect width=\"1000\" height=\"748\" fill=\"#ffffff\"/>\n",
+             <rect width=\"1000\" height=\"940\" fill=\"#ffffff\"/>\n",
         );
-        for (k, panel) in [&whole, &zoomed].into_iter().enumerate() {
-            let _ = writeln!(
-                svg,
-                "<clipPath id=\"panel{k}\"><rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/></clipPath>",
-                panel.left, panel.top, panel.width, panel.height
-            );
-        }
-        text(
-            &mut svg,
-            60.0,
-            28.0,
-            17.0,
-            "A ray through one prism: the first cut",
-        );
-        text(
-            &mut svg,
-            60.0,
-            49.0,
-            13.0,
-            "Its curve over the map is cut into 15 children, each held against the map's pyramid.",
-        );
-        self.panel(&mut svg, &whole, 0, [0, 0]);
-        // What is close up below.
-        let [a, b] = x.map(|along| whole.x(along));
-        let bottom = whole.top + whole.height;
-        let _ = writeln!(
-            svg,
-            "<path d=\"M{a:.1} {bottom:.1}H{b:.1}\" stroke=\"{INK}\" stroke-width=\"5\"/>"
-        );
-        text(
-            &mut svg,
-            60.0,
-            364.0,
-            17.0,
-            "The part above the black bar, close up",
-        );
-        text(
-            &mut svg,
-            60.0,
-            384.0,
-            13.0,
-            "What was not skipped is cut again, then walked: thin lines are texel lines, between which the surface is solved.",
-        );
-        self.panel(&mut svg, &zoomed, 1, [1, deepest]);
-        for (panel, label) in [(&whole, false), (&zoomed, true)] {
-            let (x, y) = (panel.x(hit.along), panel.y(hit.ray));
-            let _ = writeln!(
-                svg,
-                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"#ffffff\" stroke=\"#b3123f\" stroke-width=\"2.5\"/>"
-            );
-            if label {
-                text(&mut svg, x + 12.0, y - 8.0, 14.0, "hit");
-            }
-        }
-        let mut left = 60.0;
-        for fate in [Fate::Skipped, Fate::Cut, Fate::Walked, Fate::Behind] {
-            let (fill, line, name) = look(fate);
-            let _ = writeln!(
-                svg,
-                "<rect x=\"{left:.1}\" y=\"690\" width=\"16\" height=\"14\" fill=\"{fill}\" stroke=\"{line}\"/>"
-            );
-            text(&mut svg, left + 22.0, 702.0, 13.0, name);
-            left += 46.0 + 6.3 * name.len() as f64;
-        }
-        text(
-            &mut svg,
-            60.0,
-            730.0,
-            13.0,
-            "Red: the ray. Brown: the surface under it. Boxes: from the smallest to the largest height around a child, as the pyramid has it.",
-        );
+        self.over_the_map(&mut svg);
+        self.along_the_ray(&mut svg);
+        self.along_the_path(&mut svg);
         svg.push_str("</svg>\n");
         svg
     }
 
-    /// Axes, profile, children of some depths, and the ray.
-    fn panel(&self, svg: &mut String, panel: &Panel, k: usize, [first, last]: [u32; 2]) {
-        let bottom = panel.top + panel.height;
-        let _ = writeln!(svg, "<g clip-path=\"url(#panel{k})\">");
-        let profile = self.path(panel, |p| p.surface);
-        let _ = writeln!(
+    fn hit(&self) -> PathPoint {
+        self.explanation.hit.expect("the ray hits")
+    }
+
+    fn leaves(&self) -> impl Iterator<Item = &LeafTold> {
+        self.explanation
+            .blocks
+            .iter()
+            .flat_map(|block| &block.leaves)
+    }
+
+    /// The leaf with the hit.
+    fn last_leaf(&self) -> &LeafTold {
+        let at = self.hit().texel;
+        let holds = |leaf: &&LeafTold| {
+            let [low, high] = leaf.part.texels;
+            leaf.part.fate == Fate::Entered && at.cmpge(low).all() && at.cmple(high).all()
+        };
+        self.leaves().find(holds).expect("a leaf was looked at")
+    }
+
+    /// The triangle in texel coordinates.
+    fn over_the_map(&self, svg: &mut String) {
+        let Explanation {
+            corners,
+            path,
+            blocks,
+            ..
+        } = self.explanation;
+        text(svg, 40.0, 28.0, 17.0, "1. Over the map");
+        text(
             svg,
-            "<path d=\"{profile}V{:.1}H{:.1}Z\" fill=\"#e5dccd\" stroke=\"none\"/>",
-            bottom + 9.0,
-            panel.left - 9.0
+            40.0,
+            48.0,
+            13.0,
+            "The base triangle in texel coordinates; red: the ray's path.",
         );
-        for child in &self.explanation.children {
-            let [a, b] = child.t.map(|t| self.at(t).along);
-            if child.depth < first || child.depth > last || !panel.holds(0.5 * (a + b)) {
-                continue;
+        let ends = blocks.iter().flat_map(|block| block.texels);
+        let panel = Panel::square(ends, [40.0, 60.0, 440.0]).unstretched();
+        panel.clip(svg, "map");
+        for block in blocks {
+            for part in &block.parts {
+                panel.rectangle(svg, part.texels, &style(part.fate, 0.35, 0.6));
             }
-            let (fill, line, _) = look(child.fate);
-            let ([x0, x1], [low, high]) = ([a, b].map(|x| panel.x(x)), child.heights);
-            let _ = writeln!(
-                svg,
-                "<rect x=\"{x0:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{fill}\" fill-opacity=\"0.55\" stroke=\"{line}\"/>",
-                panel.y(high),
-                x1 - x0,
-                panel.y(low) - panel.y(high)
-            );
-            if child.fate == Fate::Walked {
-                for &at in self.lines.iter().filter(|&&at| a < at && at < b) {
-                    let x = panel.x(at);
-                    let _ = writeln!(
-                        svg,
-                        "<path d=\"M{x:.1} {:.1}V{:.1}\" stroke=\"{line}\" stroke-width=\"0.7\"/>",
-                        panel.y(high),
-                        panel.y(low)
-                    );
-                }
+            for leaf in &block.leaves {
+                panel.rectangle(svg, leaf.part.texels, &style(leaf.part.fate, 0.95, 0.6));
             }
         }
-        let ray = self.path(panel, |p| p.ray);
+        for BlockTold { texels, fate, .. } in blocks {
+            let fill = match fate {
+                Fate::Missed => "#ffffff",
+                Fate::Behind => "#dededf",
+                _ => "none",
+            };
+            let style = format!(
+                "fill=\"{fill}\" fill-opacity=\"0.7\" stroke=\"{INK}\" stroke-width=\"1.2\""
+            );
+            panel.rectangle(svg, *texels, &style);
+        }
+        panel.polygon(
+            svg,
+            corners,
+            &format!("fill=\"none\" stroke=\"{GROUND}\" stroke-width=\"2.5\""),
+        );
+        let style = format!("stroke=\"{RAY}\" stroke-width=\"2.2\"");
+        panel.line(svg, path.iter().map(|p| p.texel), &style);
+        svg.push_str("</g>\n");
+        panel.ring(svg, self.hit().texel);
+        panel.frame(svg);
+        let top = 520.0;
+        legend(
+            svg,
+            [40.0, top],
+            ("#e6f0f8", "#7ba3c8"),
+            "part of 16x8 cells: culled",
+        );
+        legend(
+            svg,
+            [40.0, top + 20.0],
+            look(Fate::Missed),
+            "leaf of 8x4 cells: culled",
+        );
+        legend(
+            svg,
+            [40.0, top + 40.0],
+            look(Fate::Entered),
+            "leaf: looked at",
+        );
+        legend(svg, [280.0, top], ("#ffffff", INK), "block: box not met");
+        legend(
+            svg,
+            [280.0, top + 20.0],
+            look(Fate::Behind),
+            "behind the hit",
+        );
+    }
+
+    /// The leaf with the hit, seen along the ray.
+    fn along_the_ray(&self, svg: &mut String) {
+        let leaf = self.last_leaf();
+        text(svg, 520.0, 28.0, 17.0, "2. Along the ray");
+        text(
+            svg,
+            520.0,
+            48.0,
+            13.0,
+            "The leaf with the hit, as the ray sees it; stretched.",
+        );
+        // Normals go up.
+        let vertices: Vec<DVec2> = leaf.vertices.iter().map(|p| DVec2::new(p.y, p.x)).collect();
+        let panel = Panel::square(vertices.iter().copied(), [520.0, 60.0, 440.0]);
+        panel.clip(svg, "leaf");
+        let vertex = |i: usize, j: usize| vertices[9 * j + i];
+        let cell = |[i, j]: [usize; 2]| {
+            [
+                vertex(i, j),
+                vertex(i + 1, j),
+                vertex(i + 1, j + 1),
+                vertex(i, j + 1),
+            ]
+        };
+        for j in 0..4 {
+            for i in 0..8 {
+                let style =
+                    "fill=\"#efe9df\" fill-opacity=\"0.6\" stroke=\"#a08f72\" stroke-width=\"0.8\"";
+                panel.polygon(svg, &cell([i, j]), style);
+            }
+        }
+        for told in &leaf.cells {
+            let (fill, _) = look_of_cell(told.fate);
+            let corners = cell(told.cell);
+            let style = format!(
+                "fill=\"{fill}\" fill-opacity=\"0.8\" stroke=\"{INK}\" stroke-width=\"1.4\""
+            );
+            panel.polygon(svg, &corners, &style);
+            let low = corners.into_iter().fold(DVec2::INFINITY, DVec2::min);
+            let high = corners.into_iter().fold(DVec2::NEG_INFINITY, DVec2::max);
+            let style = format!(
+                "fill=\"none\" stroke=\"{INK}\" stroke-width=\"0.8\" stroke-dasharray=\"4 3\""
+            );
+            panel.rectangle(svg, [low, high], &style);
+        }
+        svg.push_str("</g>\n");
+        panel.ring(svg, DVec2::ZERO);
+        panel.frame(svg);
+        let mut top = 520.0;
+        for fate in [CellFate::Missed, CellFate::Hit, CellFate::Judged] {
+            if leaf.cells.iter().any(|cell| cell.fate == fate) {
+                let (fill, name) = look_of_cell(fate);
+                legend(svg, [520.0, top], (fill, INK), name);
+                top += 20.0;
+            }
+        }
+        text(
+            svg,
+            520.0,
+            top + 11.0,
+            13.0,
+            "Dashed: boxes that hold the ray, which is the ring.",
+        );
+    }
+
+    /// Heights along the path.
+    fn along_the_path(&self, svg: &mut String) {
+        text(svg, 40.0, 610.0, 17.0, "3. From the side");
+        text(
+            svg,
+            40.0,
+            630.0,
+            13.0,
+            "Heights along the path: the ray (red), the surface (brown), and the range of heights of each leaf that the path crosses.",
+        );
+        let path = &self.explanation.path;
+        let mut along = vec![0.0];
+        for pair in path.windows(2) {
+            along.push(along[along.len() - 1] + pair[1].texel.distance(pair[0].texel));
+        }
+        let panel = Panel {
+            x: [0.0, along[along.len() - 1]],
+            y: [-0.02, 1.02],
+            left: 60.0,
+            top: 644.0,
+            width: 900.0,
+            height: 240.0,
+        };
+        panel.clip(svg, "side");
+        let line = |height: &dyn Fn(&PathPoint) -> f64| -> Vec<DVec2> {
+            let points = path.iter().zip(&along);
+            points.map(|(p, &x)| DVec2::new(x, height(p))).collect()
+        };
+        let surface = line(&|p| self.map.sample(p.texel).height);
+        let mut ground = surface.clone();
+        ground.extend([DVec2::new(panel.x[1], -1.0), DVec2::new(0.0, -1.0)]);
+        panel.polygon(svg, &ground, "fill=\"#e5dccd\"");
+        for leaf in self.leaves() {
+            let [low, high] = leaf.part.texels;
+            let inside: Vec<f64> = path
+                .iter()
+                .zip(&along)
+                .filter(|(p, _)| p.texel.cmpge(low).all() && p.texel.cmple(high).all())
+                .map(|(_, &x)| x)
+                .collect();
+            if let (Some(&from), Some(&to)) = (inside.first(), inside.last()) {
+                let [bottom, top] = leaf.part.heights;
+                let ends = [DVec2::new(from, bottom), DVec2::new(to, top)];
+                panel.rectangle(svg, ends, &style(leaf.part.fate, 0.7, 1.0));
+            }
+        }
+        let style = format!("stroke=\"{GROUND}\" stroke-width=\"1.6\"");
+        panel.line(svg, surface.into_iter(), &style);
+        let style = format!("stroke=\"{RAY}\" stroke-width=\"2.2\"");
+        panel.line(svg, line(&|p| p.height).into_iter(), &style);
+        svg.push_str("</g>\n");
+        let hit = self.hit();
+        let next = path
+            .partition_point(|p| p.t < hit.t)
+            .clamp(1, path.len() - 1);
+        let part = (hit.t - path[next - 1].t) / (path[next].t - path[next - 1].t);
+        let at = along[next - 1] + part * (along[next] - along[next - 1]);
+        panel.ring(svg, DVec2::new(at, hit.height));
+        panel.frame(svg);
         let _ = writeln!(
             svg,
-            "<path d=\"{profile}\" fill=\"none\" stroke=\"#7a6748\" stroke-width=\"1.6\"/>\n\
-             <path d=\"{ray}\" fill=\"none\" stroke=\"#b3123f\" stroke-width=\"2.2\"/>\n</g>"
+            "<text transform=\"translate(50 764) rotate(-90)\" text-anchor=\"middle\" font-size=\"11\" fill=\"{INK}\">height in the map</text>"
         );
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"none\" stroke=\"{INK}\"/>",
-            panel.left, panel.top, panel.width, panel.height
-        );
-        let middle = panel.top + 0.5 * panel.height;
-        let _ = writeln!(
-            svg,
-            "<text x=\"0\" y=\"0\" transform=\"translate(44 {middle:.1}) rotate(-90)\" text-anchor=\"middle\" fill=\"{INK}\">height in the map</text>"
-        );
-        let step = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0]
-            .into_iter()
-            .find(|step| (panel.x[1] - panel.x[0]) / step <= 12.0)
-            .unwrap_or(100.0);
-        let mut at = (panel.x[0] / step).ceil() * step;
+        let mut at = 0.0;
         while at <= panel.x[1] {
             let x = panel.x(at);
             let _ = writeln!(
                 svg,
-                "<path d=\"M{x:.1} {bottom:.1}v5\" stroke=\"{INK}\"/>\
-                 <text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"11\" fill=\"{INK}\">{at}</text>",
-                bottom + 17.0
+                "<path d=\"M{x:.1} 884v5\" stroke=\"{INK}\"/>\
+                 <text x=\"{x:.1}\" y=\"901\" text-anchor=\"middle\" font-size=\"11\" fill=\"{INK}\">{at}</text>"
             );
-            at += step;
+            at += 10.0;
         }
         let _ = writeln!(
             svg,
-            "<text x=\"940\" y=\"{:.1}\" text-anchor=\"end\" font-size=\"11\" fill=\"{INK}\">texels along the curve</text>",
-            bottom + 31.0
+            "<text x=\"960\" y=\"917\" text-anchor=\"end\" font-size=\"11\" fill=\"{INK}\">texels along the path</text>"
         );
     }
+}
 
-    fn path(&self, panel: &Panel, height: impl Fn(&Place) -> f64) -> String {
-        let mut d = String::new();
-        // One place more on either side, for the lines to leave the panel.
-        let from = self
-            .places
-            .partition_point(|p| p.along < panel.x[0])
-            .saturating_sub(1);
-        let to = self.places.partition_point(|p| p.along <= panel.x[1]) + 1;
-        for (i, p) in self.places[from..to.min(self.places.len())]
-            .iter()
-            .enumerate()
-        {
-            let letter = if i == 0 { 'M' } else { 'L' };
-            let _ = write!(
-                d,
-                "{letter}{:.1} {:.1}",
-                panel.x(p.along),
-                panel.y(height(p))
-            );
-        }
-        d
-    }
+/// Of a part.
+fn style(fate: Fate, opacity: f64, width: f64) -> String {
+    let (fill, line) = look(fate);
+    format!("fill=\"{fill}\" fill-opacity=\"{opacity}\" stroke=\"{line}\" stroke-width=\"{width}\"")
+}
+
+fn legend(svg: &mut String, [x, y]: [f64; 2], (fill, line): (&str, &str), name: &str) {
+    let _ = writeln!(
+        svg,
+        "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"16\" height=\"13\" fill=\"{fill}\" stroke=\"{line}\"/>"
+    );
+    text(svg, x + 23.0, y + 11.0, 13.0, name);
 }
 
 fn text(svg: &mut String, x: f64, y: f64, size: f64, words: &str) {

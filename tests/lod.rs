@@ -1,4 +1,4 @@
-//! Level of detail: hits within half a footprint of the exact ones and no ray lost, and a minified map that does not alias.
+//! Level of detail: hits are what they are without, and a minified map does not alias.
 #![cfg(any(feature = "embree", feature = "bvh"))]
 
 #[path = "../benches/common/mod.rs"]
@@ -17,7 +17,7 @@ use common::numbers::Numbers;
 use glam::{Affine3A, Vec3};
 use kinds::{ray, surfaces};
 use prismarch::prism::{EditBounds, Lod, March, MarchError, PrismOptions, Prisms, Step};
-use prismarch::ray::{Ray, RayPacket};
+use prismarch::ray::{Cone, Ray};
 use prismarch::render::{Picture, RenderInput, render};
 use prismarch::scene::{Camera, Color, Film, Integrator, Light, Material, Scalar, ToneCurve};
 use prismarch::surface::{DisplacedSurface, TexelRect, Texels, Wrap};
@@ -58,72 +58,29 @@ fn tracers(world: &World) -> Vec<Box<dyn Tracer>> {
     ]
 }
 
-/// The first hit that no interval cuts off, for the law at both ends of one.
-fn is_at_an_end(ray: &Ray, t: f32, spread: f32) -> bool {
-    let off = |end: f32| (t - end).abs() <= 0.51 * spread * t + 1e-5 * t;
-    off(ray.tnear) || off(ray.tfar)
-}
-
 #[test]
-fn hits_are_within_half_a_footprint_and_none_is_lost() {
+fn hits_are_exact_whatever_the_spread() {
     for (name, surface) in surfaces() {
         let exact = world(&prisms(&surface, Lod::Off), Placement::World);
         let exact = tracers(&exact).remove(0);
-        let cone = prisms(&surface, Lod::Cone);
-        let placed = world(&cone, Placement::World);
+        let placed = world(&prisms(&surface, Lod::Cone), Placement::World);
         let backends = tracers(&placed);
         let around = exact.bounds();
         for spread in SPREADS {
             placed.set_spread(spread);
             let mut numbers = Numbers::new(7);
-            let (mut hits, mut off, mut farthest) = (0, 0, 0.0f32);
+            let mut hits = 0;
             for _ in 0..RAYS {
                 let ray = ray(&mut numbers, &around);
-                let expected = exact.intersect(&ray);
-                let found = backends[0].intersect(&ray);
-                for other in &backends {
-                    assert_eq!(
-                        other.intersect(&ray).map(bits),
-                        found.map(bits),
-                        "{name} {spread}"
-                    );
-                    assert_eq!(
-                        other.occluded(&ray),
-                        found.is_some(),
-                        "{name} {spread} {ray:?}"
-                    );
+                let expected = exact.intersect(&ray).map(bits);
+                hits += usize::from(expected.is_some());
+                for backend in &backends {
+                    let found = backend.intersect(&ray).map(bits);
+                    assert_eq!(found, expected, "{name} {spread} {ray:?}");
+                    let occluded = backend.occluded(&ray);
+                    assert_eq!(occluded, expected.is_some(), "{name} {spread} {ray:?}");
                 }
-                let (Some(a), Some(b)) = (expected, found) else {
-                    let Some(one) = expected.or(found) else {
-                        continue;
-                    };
-                    let at_an_end = is_at_an_end(&ray, one.t, spread);
-                    assert!(at_an_end, "{name} {spread}: {ray:?} {expected:?} {found:?}");
-                    continue;
-                };
-                if is_at_an_end(&ray, a.t, spread) {
-                    continue;
-                }
-                hits += 1;
-                off += usize::from(a.t != b.t);
-                let part = (a.t - b.t).abs() / (0.5 * spread * a.t);
-                farthest = farthest.max(part);
-                let most = 0.5 * spread * a.t + 4.0 * f32::EPSILON * a.t;
-                assert!(
-                    (a.t - b.t).abs() <= most,
-                    "{name} {spread}: {ray:?} {a:?} {b:?}"
-                );
-                // On the side of the ray, though it is a mean.
-                assert!(b.ng.is_normalized(), "{name}: {b:?}");
-                assert_eq!(
-                    a.ng.dot(ray.direction) < 0.0,
-                    b.ng.dot(ray.direction) < 0.0,
-                    "{name}"
-                );
             }
-            println!(
-                "{name}, {spread}: {hits} hits, {off} not exact, at most {farthest:.3} of half a footprint"
-            );
             assert!(hits > RAYS / 20, "{name}");
         }
     }
@@ -137,40 +94,23 @@ fn bits(hit: Hit) -> ([u32; 6], u32) {
 }
 
 #[test]
-fn without_a_spread_hits_are_exact_to_the_bit_and_packets_are_as_single_rays() {
-    for (name, surface) in surfaces() {
-        let exact = tracers(&world(&prisms(&surface, Lod::Off), Placement::World)).remove(0);
-        let cone = world(&prisms(&surface, Lod::Cone), Placement::World);
-        let tracer = tracers(&cone).remove(0);
-        let mut numbers = Numbers::new(11);
-        let rays: Vec<Ray> = (0..RAYS / 8 * 8)
-            .map(|_| ray(&mut numbers, &exact.bounds()))
-            .collect();
-        for ray in &rays {
-            assert_eq!(
-                tracer.intersect(ray).map(bits),
-                exact.intersect(ray).map(bits),
-                "{name}"
-            );
+fn off_is_off() {
+    let noise = maps::white(256, 256, Wrap::Repeat);
+    let surface = meshes::displaced(meshes::flat(4), noise, 0.004, 0.0);
+    let off = world(&prisms(&surface, Lod::Off), Placement::World);
+    off.set_spread(0.1);
+    let tracer = tracers(&off).remove(0);
+    let cone = Cone::from_eye(0.1);
+    let mut numbers = Numbers::new(11);
+    let mut seen = 0;
+    for _ in 0..RAYS {
+        let ray = ray(&mut numbers, &tracer.bounds());
+        if let Some(hit) = tracer.intersect(&ray) {
+            assert_eq!(off.seen_point(&hit, &ray, &cone), off.surface_point(&hit));
+            seen += 1;
         }
-        cone.set_spread(0.01);
-        for eight in rays.chunks(8) {
-            let single: Vec<_> = eight
-                .iter()
-                .map(|ray| tracer.intersect(ray).map(bits))
-                .collect();
-            let packet = tracer.intersect8(&RayPacket::from_rays(eight));
-            assert_eq!(packet.map(|hit| hit.map(bits)).to_vec(), single, "{name}");
-        }
-        // Off is off.
-        let off = world(&prisms(&surface, Lod::Off), Placement::World);
-        off.set_spread(0.1);
-        let off = tracers(&off).remove(0);
-        assert!(
-            rays.iter()
-                .all(|ray| off.intersect(ray).map(bits) == exact.intersect(ray).map(bits))
-        );
     }
+    assert!(seen > RAYS / 20);
 }
 
 #[test]
@@ -205,12 +145,12 @@ fn instances_scale_what_is_seen_and_not_the_angle() {
         let (Some(near), Some(other)) = (a.intersect(&ray), b.intersect(&far)) else {
             continue;
         };
-        // Rounding may decide for another run of the curve.
+        // Rounding may move a ray to the other side of an edge.
         if (near.t - other.t).abs() > 1e-5 * near.t {
             continue;
         }
         seen += 1;
-        let eye = prismarch::ray::Cone::from_eye(0.02);
+        let eye = Cone::from_eye(0.02);
         let (p, q) = (
             here.seen_point(&near, &ray, &eye),
             there.seen_point(&other, &far, &eye),
@@ -263,14 +203,22 @@ fn edits_are_seen() {
         Wrap::Repeat,
     );
     let again = meshes::displaced(meshes::flat(4), again.unwrap(), 0.004, 0.0);
-    let new = world(&prisms(&again), Placement::World);
-    new.set_spread(0.03);
-    let (edited, new) = (tracers(&placed).remove(0), tracers(&new).remove(0));
+    let fresh = world(&prisms(&again), Placement::World);
+    fresh.set_spread(0.03);
+    let (edited, new) = (tracers(&placed).remove(0), tracers(&fresh).remove(0));
+    let cone = Cone::from_eye(0.03);
     let mut numbers = Numbers::new(2);
     for _ in 0..RAYS {
         let ray = ray(&mut numbers, &new.bounds());
         let (a, b) = (edited.intersect(&ray), new.intersect(&ray));
         assert_eq!(a.map(bits), b.map(bits), "{ray:?}");
+        if let (Some(a), Some(b)) = (a, b) {
+            let (a, b) = (
+                placed.seen_point(&a, &ray, &cone),
+                fresh.seen_point(&b, &ray, &cone),
+            );
+            assert_eq!(a, b, "{ray:?}");
+        }
     }
 }
 
@@ -356,7 +304,7 @@ fn a_minified_map_does_not_alias() {
     const SIDE: usize = 4096;
     // Root mean square of the map's slopes, and the largest part of the difference that may be left: where slopes are steep,
     // shadows among texels and light that falls flat on their sides are missed, and the picture is a little too bright.
-    let cases = [(0.04, 0.25), (0.1, 0.4)];
+    let cases = [(0.04, 0.25), (0.1, 0.4), (0.3, 0.7)];
     let spp = if cfg!(debug_assertions) { 32 } else { 256 };
     for (slope, most) in cases {
         // Of central differences over white noise.

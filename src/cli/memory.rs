@@ -34,7 +34,7 @@ pub struct Common {
 /// Bytes that this method adds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Overhead {
-    /// Prisms, 108 bytes per base triangle, and 28 per wall of closed seams.
+    /// Prisms, 108 bytes per base triangle, 32 per block of up to 32x32 texels, and 28 per wall of closed seams.
     pub prisms: usize,
     /// Min/max pyramids of displacement maps.
     pub pyramids: usize,

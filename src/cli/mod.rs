@@ -45,7 +45,7 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input, 4 output could not be 
 /// Ray traces displaced surfaces without tessellating them.
 ///
 /// A low-poly mesh and a displacement map are traced directly: no micro-triangles, 108 bytes per base triangle
-/// beside the map.
+/// and 32 per block of up to 32x32 texels beside the map.
 #[derive(Parser)]
 #[command(name = "prismarch", version, after_help = AFTER_HELP)]
 struct Cli {

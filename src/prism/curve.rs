@@ -59,8 +59,6 @@ pub struct View<Q> {
     depth: [Q; 2],
     /// Largest lateral coordinate of a corner: Q is known to about 1e-16 of its square.
     pub width: f64,
-    /// |n_1 - n_0|^2, |n_2 - n_1|^2, |n_0 - n_2|^2.
-    pub spread: Q,
     /// Lateral direction of the sides at w = 0: decides for a ray exactly in a side's plane.
     tie: [Q; 2],
 }
@@ -164,7 +162,6 @@ impl<Q: Quad> View<Q> {
         let reach = Q::splat(reach);
         let widest_x = ex.abs() * reach + ax.abs();
         let widest_y = ey.abs() * reach + ay.abs();
-        let (dx, dy, dz) = (nx.rotate() - nx, ny.rotate() - ny, nz.rotate() - nz);
         Self {
             areas: [
                 ax1 * ay2 - ay1 * ax2,
@@ -174,7 +171,6 @@ impl<Q: Quad> View<Q> {
             depth: [depth, nz],
             width: widest_x.max(widest_y).max_of_three(),
             tie: [ax2 - ax1, ay2 - ay1],
-            spread: dx * dx + (dy * dy + dz * dz),
         }
     }
 

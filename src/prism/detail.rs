@@ -1,7 +1,7 @@
-//! Level of detail by the ray's cone: what is asked for, and the surface as a footprint sees it.
+//! Level of detail by the ray's cone: the surface as a footprint sees it.
 //!
-//! The march ends where it knows the hit to half a footprint (`march/exact/lod.rs`); what is seen there is the mean over the footprint,
-//! by the map's means ([`DisplacementMap::averaged`](crate::surface::DisplacementMap::averaged)).
+//! Hits are exact. What is seen there is the mean over the footprint, by the map's means
+//! ([`DisplacementMap::averaged`](crate::surface::DisplacementMap::averaged)).
 
 use std::sync::atomic::Ordering;
 
@@ -11,17 +11,16 @@ use super::{PrismHit, Prisms};
 use crate::ray::Footprint;
 use crate::surface::{HeightSample, Patch, SurfacePoint, smooth_normal};
 
-/// Whether hits may be off by what a pixel does not show.
+/// Whether surfaces are seen as the ray's cone sees them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Lod {
-    /// Every hit is exact.
+    /// As they are, texel by texel.
     #[default]
     Off,
-    /// A hit is within half the width of the ray's cone of the exact one, along the ray, and [`Prisms::seen_point`] has the normals of the
-    /// mean surface over that width.
+    /// [`Prisms::seen_point`] has the normals of the mean surface over the cone's width. Hits are the same as without.
     ///
-    /// The cone is a point at the ray's origin and grows by [`Prisms::spread`]: so it needs nothing of the ray, and rays of any Embree
-    /// program have one. A ray that starts on a surface is marched as exactly as one from an eye there.
+    /// Rays that leave such a point are to start half the cone's width further off the surface ([`Prisms::tolerance`]): from where they
+    /// are not shaded by texels that the cone does not show.
     Cone,
 }
 
@@ -35,9 +34,9 @@ impl Lod {
     }
 }
 
-/// A unit normal on the side of the unit vector `to_ray`. What is known to half a footprint, or is a mean, may lean away from a ray that
-/// meets the surface from that side: then it is leant back by as little as shows.
-pub fn turned(normal: Vec3, to_ray: Vec3) -> Vec3 {
+/// A unit normal on the side of the unit vector `to_ray`. A mean may lean away from a ray that meets the surface from that side: then it is
+/// leant back by as little as shows.
+fn turned(normal: Vec3, to_ray: Vec3) -> Vec3 {
     const LEAST: f32 = 0.02;
     let facing = normal.dot(to_ray);
     if facing >= LEAST {
@@ -51,27 +50,27 @@ pub fn turned(normal: Vec3, to_ray: Vec3) -> Vec3 {
 const LONGEST: f64 = 8.0;
 
 impl Prisms {
-    /// Whether hits may be off.
+    /// Whether surfaces are seen as the ray's cone sees them.
     pub fn lod(&self) -> Lod {
         self.lod
     }
 
-    /// Growth of every ray's cone per unit of length: radians, 0 until [`Self::set_spread`] is called. Twice this is how far a hit may be
-    /// off, as a part of its distance.
+    /// Growth of a cone from the eye per unit of length: radians, 0 until [`Self::set_spread`] is called.
     pub fn spread(&self) -> f32 {
         f32::from_bits(self.spread.load(Ordering::Relaxed))
     }
 
     /// Sets the spread of the cones of [`Lod::Cone`]: the angle of one pixel, 2 tan(fov / 2) / height. Does nothing where level of
-    /// detail is off; 0, or what is no positive number, makes hits exact again. Takes effect with the next ray: nothing is built
-    /// anew when a camera zooms.
+    /// detail is off; with 0, or what is no positive number, surfaces are seen as they are. Takes effect at once: nothing is
+    /// built anew when a camera zooms.
     pub fn set_spread(&self, spread: f32) {
         let sound = self.lod == Lod::Cone && spread > 0.0 && spread.is_finite();
         let spread = if sound { spread } else { 0.0 };
         self.spread.store(spread.to_bits(), Ordering::Relaxed);
     }
 
-    /// How far a hit at parameter `t` of a ray along `direction` may be off, in units of both: half the width of its cone.
+    /// Half the width of the cone at parameter `t` of a ray along `direction`, in units of both: [`SurfacePoint::tolerance`] of what is seen
+    /// there.
     pub fn tolerance(&self, direction: Vec3, t: f32) -> f32 {
         0.5 * self.spread() * t * direction.length()
     }

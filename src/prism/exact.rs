@@ -13,7 +13,7 @@ use super::judge::{Cells, Found, Question, walls, within};
 use super::march::polish::Root;
 use super::ray_frame::{RayFrame, axes};
 use super::simd::{Lanes, Task};
-use super::{Parts, PrismHit, Prisms};
+use super::{MarchError, Parts, PrismHit, Prisms};
 use crate::ray::{Aabb, Ray};
 use crate::surface::{Corners, DisplacedSurface, DisplacementMap, Patch, TexelBox};
 
@@ -82,7 +82,21 @@ impl StoredBox {
 }
 
 impl ExactPrisms {
-    pub fn new(surface: &DisplacedSurface, bounds: EditBounds) -> Self {
+    /// The most primitives that a backend can number.
+    const MOST: usize = u32::MAX as usize;
+
+    /// # Errors
+    ///
+    /// More primitives than [`Self::MOST`].
+    pub fn new(surface: &DisplacedSurface, bounds: EditBounds) -> Result<Self, MarchError> {
+        Self::limited(surface, bounds, Self::MOST)
+    }
+
+    fn limited(
+        surface: &DisplacedSurface,
+        bounds: EditBounds,
+        max: usize,
+    ) -> Result<Self, MarchError> {
         let count = surface.mesh().triangles().len() as u32;
         let cutter = Cutter::new(surface.map());
         let room = bounds.room(surface.map());
@@ -121,17 +135,20 @@ impl ExactPrisms {
             if !surface.walls_of(triangle).is_empty() {
                 made.walled.push(triangle);
             }
+            if made.len() > max {
+                return Err(MarchError::TooManyPrimitives { max });
+            }
         }
         for primitive in made.boxes.len()..made.len() {
             let bounds = made.bounds_now(surface, room, primitive as u32);
             made.boxes.push(StoredBox::new(bounds));
         }
-        made
+        Ok(made)
     }
 
     /// What texels mean.
     #[inline(always)]
-    fn heights(&self) -> Heights {
+    pub fn heights(&self) -> Heights {
         Heights {
             most: f32::from_bits(self.most.load(Ordering::Relaxed)),
             ..self.heights
@@ -436,7 +453,7 @@ impl<L: Lanes> Task<L> for Hit<'_, '_> {
 
 /// The hit on S at a crossing.
 #[inline(always)]
-fn hit(patch: &Patch<'_>, triangle: u32, crossing: &Crossing) -> PrismHit {
+pub fn hit(patch: &Patch<'_>, triangle: u32, crossing: &Crossing) -> PrismHit {
     let Crossing {
         at: Found { t, u, v },
         ng,
@@ -461,3 +478,6 @@ fn normal_without_surface(patch: &Patch<'_>) -> Vec3 {
     }
     .as_vec3()
 }
+
+#[cfg(test)]
+mod tests;

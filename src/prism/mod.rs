@@ -3,15 +3,17 @@
 //! R. Hoetzlein, "Projective Displacement Mapping for Ray Traced Editable Surfaces", Computer Graphics Forum 44(7),
 //! 2025, doi 10.1111/cgf.70235.
 //!
-//! A ray that enters a prism's box is clipped to slabs (`frame`, `path`), then to the prism's sides
-//! (`sides`); along what is left the surface is looked for (`march`), and the crossing is polished on the
-//! surface's definition ([`crate::surface`]). This room knows no Embree, no scene and no picture.
+//! The exact march: base triangles are cut into blocks of texels (`exact`, `block`), whose displaced vertices are held against the ray in
+//! f32; what that cannot tell is decided in f64 (`judge`, `curve`). The uniform march, the paper's: a ray that enters a prism's box is
+//! clipped to slabs (`frame`, `path`), then to the prism's sides (`sides`); along what is left the surface is looked for (`march`), and
+//! the crossing is polished on the surface's definition ([`crate::surface`]). This room knows no Embree, no scene and no picture.
 
 mod block;
 mod curve;
 mod detail;
 mod edits;
 mod exact;
+mod explain;
 mod frame;
 mod judge;
 #[allow(unsafe_code)] // SIMD stamps
@@ -45,6 +47,9 @@ use uniform::UniformPrisms;
 
 pub use detail::Lod;
 pub use edits::{BoundsChange, EditBounds};
+pub use explain::{
+    BlockTold, CellFate, CellTold, Explanation, Fate, LeafTold, PartTold, PathPoint,
+};
 pub use march::{March, MarchError, Step};
 pub use motion::MovingPrisms;
 pub use simd::SimdLevel;
@@ -116,7 +121,7 @@ pub struct PrismOptions {
     pub march: March,
     /// How much room they have for edits of the map.
     pub edit_bounds: EditBounds,
-    /// Whether hits may be off by what a pixel does not show: the exact march only.
+    /// Whether surfaces are seen as the ray's cone sees them: the exact march only.
     pub lod: Lod,
 }
 
@@ -144,8 +149,8 @@ impl Prisms {
     ///
     /// # Errors
     ///
-    /// A step that is no positive number; closed [`Seams`] or [`Lod::Cone`] with the uniform march; more base triangles than the exact
-    /// march can number (2^27).
+    /// A step that is no positive number; closed [`Seams`] or [`Lod::Cone`] with the uniform march; more blocks than a backend can
+    /// number (2^32 - 1).
     pub fn new(
         surface: Arc<DisplacedSurface>,
         options: impl Into<PrismOptions>,
@@ -158,7 +163,7 @@ impl Prisms {
         let march = march.validate()?;
         let room = edit_bounds.room(surface.map());
         let parts = match march {
-            March::Exact => Parts::Exact(ExactPrisms::new(&surface, edit_bounds)),
+            March::Exact => Parts::Exact(ExactPrisms::new(&surface, edit_bounds)?),
             March::Uniform { .. } if surface.seams() == Seams::Closed => {
                 return Err(MarchError::SeamsNeedExact);
             }
@@ -228,8 +233,8 @@ impl Prisms {
         self.len() == 0
     }
 
-    /// Bytes beside mesh and map: 108 per base triangle (the exact march's go in groups of eight), 28 per wall where
-    /// seams are closed, and 1 per base triangle for level of detail.
+    /// Bytes beside mesh and map: 108 per base triangle; of the exact march 32 per block of up to 32x32 texels, or 28 per base triangle
+    /// that has none, and where seams are closed 28 per base triangle with walls and 28 per wall; and 1 per base triangle for level of detail.
     pub fn bytes(&self) -> usize {
         let prisms = match &self.parts {
             Parts::Exact(exact) => exact.bytes(),

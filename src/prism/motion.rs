@@ -1,7 +1,7 @@
 //! Prisms that move: the base mesh has vertices at time steps ([`MovingSurface`]).
 //!
-//! For a ray at time t the prisms of a cluster are made over the corners as they stand then, and the exact march meets them as it meets
-//! any: nothing of it knows of time. Making them takes about a microsecond per ray and cluster.
+//! For a ray at time t a primitive's base triangle is made over the corners as they stand then, and the exact march meets it as it meets
+//! any: nothing of it knows of time.
 //!
 //! **Bounds.** A backend that knows motion, as Embree, has a box per primitive and time step and takes the linear interpolation of both
 //! boxes of a segment at the times between. [`MovingSurface::block_bounds`] makes boxes that hold the surface then.
@@ -54,7 +54,7 @@ impl MovingPrisms {
     ///
     /// # Errors
     ///
-    /// The uniform march, [`Lod::Cone`], more base triangles than the exact march can number.
+    /// The uniform march, [`Lod::Cone`], more blocks than a backend can number.
     pub fn new(
         moving: Arc<MovingSurface>,
         options: impl Into<PrismOptions>,

@@ -18,9 +18,10 @@ pub fn count() {
 /// What `call` returns, and how many steps the marches of [counting](Prisms::counting_steps) prisms took in it, on the calling
 /// thread.
 ///
-/// A step is one look into the displacement map, which asks about eight places at once: of the exact march seven children of
-/// a span (15 take two steps) or up to eight texel cells, of the uniform march eight of its samples. What is decided in f64 is
-/// not counted, nor are the uniform march's bent prisms, which take another route.
+/// A step is one look into the displacement map. Of the exact march: at the smallest and largest heights of eight parts of a block
+/// (16x8 texels each; then, of those that the ray may meet, of 8x4), or at all texels of one part of 8x4. Of the uniform march: at
+/// eight of its samples. What is decided in f64 is not counted, nor are base triangles that the exact march does not cut into blocks, and the uniform
+/// march's bent prisms, which take another route.
 ///
 /// ```
 /// use prismarch::prism::count_steps;
@@ -92,15 +93,15 @@ mod tests {
         Ray::new(Vec3::new(-1.0, 0.25, 0.1), Vec3::X)
     }
 
-    fn steps(prisms: &Prisms, ray: &Ray) -> u64 {
-        count_steps(|| prisms.intersect(0, ray)).1
+    fn steps(prisms: &Prisms, primitive: u32, ray: &Ray) -> u64 {
+        count_steps(|| prisms.intersect(primitive, ray)).1
     }
 
     #[test]
     fn the_uniform_march_takes_as_many_as_its_step_asks_for() {
         for (step, samples) in [(1.0, 49_u64), (0.5, 97), (0.1, 481), (100.0, 2)] {
             let prisms = prisms(texels(step)).counting_steps();
-            let found = steps(&prisms, &over());
+            let found = steps(&prisms, 0, &over());
             // The number of texels is rounded up.
             let expected = samples.div_ceil(8)..=(samples + 1).div_ceil(8);
             assert!(expected.contains(&found), "{step}: {found}");
@@ -108,18 +109,34 @@ mod tests {
     }
 
     #[test]
-    fn the_exact_march_skips_what_is_flat_and_walks_down_to_a_hit() {
+    fn the_exact_march_skips_what_is_flat_and_looks_closer_where_it_hits() {
         let prisms = prisms(March::Exact).counting_steps();
-        // Fifteen children, all above.
-        assert_eq!(steps(&prisms, &over()), 2);
-        let down = Ray::new(Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z);
-        let grazing = Ray::new(Vec3::new(-0.5, 0.25, 0.05), Vec3::new(1.0, 0.0, -0.05));
-        for ray in [down, grazing] {
-            assert!(prisms.intersect(0, &ray).is_some());
-            assert!((2..20).contains(&steps(&prisms, &ray)), "{ray:?}");
-        }
+        let all = || 0..prisms.len() as u32;
         let beside = Ray::new(Vec3::new(2.0, 2.0, 1.0), Vec3::NEG_Z);
-        assert_eq!(steps(&prisms, &beside), 0);
+        for ray in [over(), beside] {
+            // Eight parts, all missed.
+            assert!(all().all(|primitive| steps(&prisms, primitive, &ray) == 1));
+        }
+        let down = Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z);
+        let grazing = Ray::new(Vec3::new(-0.5, 0.25, 0.05), Vec3::new(1.0, 0.0, -0.06));
+        for ray in [down, grazing] {
+            let hit = all().find(|&primitive| prisms.intersect(primitive, &ray).is_some());
+            let found = steps(&prisms, hit.expect("a hit"), &ray);
+            // Eight parts, those of up to two of them, and the texels of the leaf that is hit.
+            assert!((3..=6).contains(&found), "{ray:?}: {found}");
+        }
+    }
+
+    #[test]
+    fn maps_continued_by_their_wrap_mode_take_the_same_steps() {
+        // Of three columns of blocks the first is before the map's first texel.
+        let prisms = prisms(March::Exact).counting_steps();
+        let at = |x: f32| Ray::new(Vec3::new(x, 0.3, 1.0), Vec3::NEG_Z);
+        let most = |ray: Ray| {
+            let all = 0..prisms.len() as u32;
+            all.map(|primitive| steps(&prisms, primitive, &ray)).max()
+        };
+        assert_eq!(most(at(0.004)), most(at(0.2)));
     }
 
     #[test]
@@ -132,12 +149,14 @@ mod tests {
                     Vec3::new(0.02 * k as f32, -0.5, 0.4),
                     Vec3::new(0.1, 0.6, -0.3),
                 );
-                let (hit, none) = count_steps(|| usual.intersect(0, &ray));
-                let (same, some) = count_steps(|| counting.intersect(0, &ray));
-                assert_eq!((hit, none), (same, 0));
-                assert!(some > 0);
-                let (occluded, some) = count_steps(|| counting.occluded(0, &ray));
-                assert!(occluded == hit.is_some() && some > 0);
+                for primitive in 0..usual.len() as u32 {
+                    let (hit, none) = count_steps(|| usual.intersect(primitive, &ray));
+                    let (same, some) = count_steps(|| counting.intersect(primitive, &ray));
+                    assert_eq!((hit, none), (same, 0));
+                    assert!(some > 0);
+                    let (occluded, some) = count_steps(|| counting.occluded(primitive, &ray));
+                    assert!(occluded == hit.is_some() && some > 0);
+                }
             }
         }
     }

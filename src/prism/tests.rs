@@ -423,30 +423,21 @@ fn folded_normals_are_found_too() {
 /// Where S has no normal a hit has the base triangle's, or where that has no area, as for a moment when it moves, a vertex's.
 #[test]
 fn hits_without_a_normal_have_one() {
-    use super::march::exact::{Found, hit};
-    use super::simd::Portable;
+    use super::block::Crossing;
+    use super::exact::hit;
+    use super::judge::Found;
 
     let tip = Vec3::new(0.6, 0.0, 0.8);
     let corners = |last: Vec3| ([Vec3::ZERO, Vec3::X, last], [tip, Vec3::Z, Vec3::Z]);
     let (positions, normals) = corners(Vec3::Y);
     let mesh = triangle(positions, normals, [Vec2::ZERO, Vec2::X, Vec2::Y]);
     let surface = surface(mesh, noise_map(4, Wrap::Repeat), Displacement::new(0.1));
-    let prisms = Prisms::new(surface, March::Exact).unwrap();
-    let Parts::Exact(exact) = &prisms.parts else {
-        panic!("the exact march has exact prisms");
-    };
     for (last, expected) in [(Vec3::Y, Vec3::Z), (2.0 * Vec3::X, tip)] {
-        let cluster = exact.clusters[0].moved(&prisms.surface, &[0], |_| corners(last));
-        let problem = prisms.problem(&cluster, 0, [0.0, 1.0], false);
+        let patch = surface.patch_over(0, corners(last));
         for ng in [DVec3::ZERO, DVec3::NAN] {
-            let found = Found {
-                t: 0.5,
-                u: 0.25,
-                v: 0.25,
-                above: true,
-                ng: Some(ng),
-            };
-            let hit = hit::<Portable>(&problem, &found);
+            let (t, u, v) = (0.5, 0.25, 0.25);
+            let at = Found { t, u, v };
+            let hit = hit(&patch, 0, &Crossing { at, ng: Some(ng) });
             assert!(hit.ng.distance(expected) < 1e-6, "{hit:?}");
         }
     }

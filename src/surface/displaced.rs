@@ -119,8 +119,9 @@ pub struct SurfacePoint {
     pub texcoord: Vec2,
     /// D, world units along the unit interpolated normal.
     pub displacement: f32,
-    /// How far, along the ray that was asked about, the point may be from the first one that the ray meets; 0 but where there is level of
-    /// detail. Rays that leave the point start as much further off the surface, so that they do not meet what was left out.
+    /// Rays that leave the point start as much further off the surface: half the width of the footprint that it was seen with; 0 but
+    /// where there is level of detail. Else texels smaller than the footprint would shade one another, which is noise where normals
+    /// are means.
     pub tolerance: f32,
 }
 

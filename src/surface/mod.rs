@@ -49,7 +49,7 @@ pub use motion::{MotionError, MovingSurface, TimeStep};
 pub(crate) use patch::solve;
 pub use patch::{Patch, PatchPoint};
 pub use projection::Projection;
-pub(crate) use pyramid::{Entries, LevelRows};
+pub(crate) use pyramid::Entries;
 pub use pyramid::{Level, Pyramid};
 pub(crate) use seams::{ChartEdges, Ruled};
 pub use seams::{Seams, Wall};

@@ -34,7 +34,6 @@ use super::{Texels, Wrap};
 #[derive(Debug)]
 pub struct Pyramid {
     levels: Box<[Level]>,
-    rows: LevelRows,
     /// The finest level's sides.
     axes: [Axis; 2],
 }
@@ -49,38 +48,6 @@ pub struct Level {
     offset: usize,
     order: Order,
     entries: Arc<Entries>,
-}
-
-/// What lanes need of levels, by level. There are fewer than [`LevelRows::MOST`] levels over the longest side of a map; the last
-/// is repeated.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LevelRows {
-    /// Levels.
-    pub count: usize,
-    /// 1 / the block's sides.
-    pub per_block: [[f32; Self::MOST]; 2],
-    /// The last block of a row, and the last row.
-    pub last: [[u32; Self::MOST]; 2],
-    pub width: [u32; Self::MOST],
-    pub offset: [u32; Self::MOST],
-}
-
-impl LevelRows {
-    pub const MOST: usize = 16;
-
-    fn new(levels: &[Level]) -> Self {
-        assert!(levels.len() <= Self::MOST, "a map of too many levels");
-        let of = |k: usize| &levels[k.min(levels.len() - 1)];
-        let row = |value: fn(&Level) -> usize| std::array::from_fn(|k| value(of(k)) as u32);
-        Self {
-            count: levels.len(),
-            per_block: [0, 1]
-                .map(|axis| std::array::from_fn(|k| 1.0 / (1u32 << of(k).shift[axis]) as f32)),
-            last: [row(|level| level.width - 1), row(|level| level.height - 1)],
-            width: row(|level| level.width),
-            offset: row(|level| level.offset),
-        }
-    }
 }
 
 impl Level {
@@ -199,7 +166,6 @@ impl Pyramid {
             Texels::F32(t) => build::levels(t, axes),
         };
         Self {
-            rows: LevelRows::new(&levels),
             levels: levels.into_boxed_slice(),
             axes,
         }
@@ -208,11 +174,6 @@ impl Pyramid {
     /// The levels, finest first; the last has one entry.
     pub fn levels(&self) -> &[Level] {
         &self.levels
-    }
-
-    /// The same for lanes.
-    pub(crate) fn rows(&self) -> &LevelRows {
-        &self.rows
     }
 
     /// Smallest and largest texel of the whole map, as stored.

@@ -207,9 +207,9 @@ impl World {
 
     /// The same as seen by the cone around `ray`, which made the hit.
     ///
-    /// Where level of detail is off ([`Lod::Off`](crate::prism::Lod)) this is [`Self::surface_point`]. Else the position is the ray's, which is within
-    /// [`tolerance`](SurfacePoint::tolerance) of the surface, and both normals are those of the mean surface over the cone's width, on the
-    /// side of the hit's. Under transforms that stretch, the width is taken as it is along the ray.
+    /// Where level of detail is off ([`Lod::Off`](crate::prism::Lod)) this is [`Self::surface_point`]. Else both normals are those of the
+    /// mean surface over the cone's width, on the side of the hit's, and there is a [`tolerance`](SurfacePoint::tolerance). Under transforms
+    /// that stretch, the width is taken as it is along the ray.
     pub fn seen_point(&self, hit: &Hit, ray: &Ray, cone: &Cone) -> SurfacePoint {
         let Resolved { object, transform } = self.resolve(hit);
         let prisms = match &self.objects[object].shape {
@@ -231,7 +231,6 @@ impl World {
             Some(to_world) => transformed(&seen, to_world),
         };
         SurfacePoint {
-            position: ray.at(hit.t),
             tolerance: prisms.tolerance(ray.direction, hit.t),
             ..seen
         }

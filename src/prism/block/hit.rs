@@ -1,5 +1,7 @@
 //! The hit test of a block.
 
+mod explain;
+
 use glam::{DVec2, DVec3};
 
 use super::cell::{Verdict, judged};
@@ -9,12 +11,14 @@ use super::middle::Heights;
 use super::newton::{Cell, land};
 use super::place::{PART, PARTS, Place, leaf_of, leaves_of};
 use super::view::View;
-use super::{Block, LEAF, Record, SIDE};
+use super::{Block, LEAF, Record};
 use crate::prism::judge::{Cells, Found, Question, within};
 use crate::prism::ray_frame::{RayFrame, axes};
 use crate::prism::simd::{LANES, Lanes, Task};
 use crate::ray::Ray;
 use crate::surface::{Corners, DisplacedSurface, Patch};
+
+pub use explain::told;
 
 /// A block, and what is asked of it.
 pub struct Ask<'a> {

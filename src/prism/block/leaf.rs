@@ -90,6 +90,7 @@ impl Leaf {
         rise: f32,
         rows: &impl Rows,
     ) -> u32 {
+        L::step();
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let tolerance = self.off + view.shear * 0.5 * self.beta(rise, heights.most);
         let tolerance = L::splat(tolerance);

@@ -23,8 +23,8 @@ mod record;
 mod tests;
 mod view;
 
-pub use cut::{Cutter, Whole};
-pub use hit::{Ask, Crossing, nearest};
+pub use cut::Cutter;
+pub use hit::{Ask, Crossing, nearest, told};
 pub use middle::Heights;
 pub use outline::outline;
 pub use record::{Block, Record};

@@ -4,7 +4,7 @@ use super::cull::{Offsets, above, beyond};
 use super::middle::{Heights, Middle};
 use super::place::{PARTS, Place, leaves_of};
 use super::view::rounding;
-use super::{Block, LEAF, Record, SIDE};
+use super::{Block, LEAF, Record};
 use crate::prism::exact::hull;
 use crate::prism::simd::{LANES, Lanes, Portable};
 use crate::ray::Aabb;

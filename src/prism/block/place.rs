@@ -120,6 +120,7 @@ impl<'m> Place<'m> {
         [a, b]: [usize; 2],
         places: impl Fn() -> [[u32; 2]; LANES],
     ) -> [L; 2] {
+        L::step();
         let levels = self.map.pyramid().levels();
         if let (Some([x, y]), Some(level)) = (self.stored, levels.get(level)) {
             let tile = level.tile(x / SIDE as usize, y / SIDE as usize);
@@ -256,17 +257,23 @@ impl Place<'_> {
         mask
     }
 
+    /// The cells of the leaf at cell (i, j).
     pub fn part(&self, i: u32, j: u32) -> Cells {
-        let along = |k: usize, from: u32| {
-            let to = (from + LEAF[k]).min(self.count[k]);
+        self.rectangle([i, j], LEAF)
+    }
+
+    /// The block's cells in a rectangle of it.
+    pub fn rectangle(&self, from: [u32; 2], size: [u32; 2]) -> Cells {
+        let along = |k: usize| {
+            let to = (from[k] + size[k]).min(self.count[k]);
             [
-                self.first[k] + i64::from(from),
+                self.first[k] + i64::from(from[k]),
                 self.first[k] + i64::from(to) - 1,
             ]
         };
         Cells {
-            x: along(0, i),
-            y: along(1, j),
+            x: along(0),
+            y: along(1),
         }
     }
 }

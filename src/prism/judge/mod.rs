@@ -19,17 +19,12 @@ mod search;
 mod tests;
 mod walls;
 
-use glam::Vec3;
-
-use super::PrismHit;
 use super::curve::{Corners, Curve, Cut, Stretch, View};
-use super::march::polish::Root;
 use super::ray_frame::RayFrame;
 use super::simd::{Lanes, Quad, Task};
 use crate::surface::Patch;
 use pieces::Piece;
 use search::{Along, Search};
-#[allow(unused_imports)] // the march goes over to it
 pub use walls::walls;
 
 /// What is asked about one base triangle.
@@ -219,44 +214,4 @@ fn piece_by_piece<L: Lanes>(search: &mut Search<'_>, view: &View<L::Quad>, stret
         }
         before = Some(part);
     }
-}
-
-/// The hit on S at a crossing.
-#[inline(always)]
-pub fn hit<L: Lanes>(patch: &Patch<'_>, prim: u32, found: &Found) -> PrismHit {
-    L::outline(Hit { patch, prim, found })
-}
-
-struct Hit<'a> {
-    patch: &'a Patch<'a>,
-    prim: u32,
-    found: &'a Found,
-}
-
-impl<L: Lanes> Task<L> for Hit<'_> {
-    type Output = PrismHit;
-
-    #[inline(always)]
-    fn run(self) -> PrismHit {
-        let Found { t, u, v } = *self.found;
-        let ng = self.patch.point(u, v).ng;
-        let mut hit = Root { t, u, v, ng }.to_hit(self.prim);
-        if hit.ng == Vec3::ZERO {
-            hit.ng = normal_without_surface(self.patch);
-        }
-        hit
-    }
-}
-
-/// What stands for the normal where opposed vertex normals cancel, or the surface shrinks to a line: the base triangle's, and a
-/// vertex normal where that has no area.
-#[cold]
-fn normal_without_surface(patch: &Patch<'_>) -> Vec3 {
-    let face = patch.face_normal();
-    if face.is_finite() {
-        face
-    } else {
-        patch.normals[0]
-    }
-    .as_vec3()
 }

@@ -1,17 +1,17 @@
-//! The judge against the march, against itself cell by cell, and against points of its curves taken one by one.
+//! The judge against itself cell by cell, and against points of rays taken one by one.
 
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec2, Vec3, vec3};
 
 use super::*;
-use crate::prism::march::exact::{self, Problem, search};
 use crate::prism::ray_frame::axes;
 use crate::prism::simd::{Portable, SimdLevel};
 use crate::prism::{March, Parts, Prisms};
 use crate::ray::Ray;
 use crate::surface::{
-    DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Seams, Texels, Wrap,
+    DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, Ruled, Seams, Texels,
+    Wrap,
 };
 
 struct Random(u64);
@@ -152,7 +152,7 @@ fn barycentric([a, b, c]: &[DVec2; 3], p: DVec2) -> Vec3 {
     DVec3::new(1.0 - u - v, u, v).as_vec3()
 }
 
-/// A surface of one triangle with the march's prism over it.
+/// A surface of one triangle, with its primitives.
 struct Case {
     prisms: Prisms,
 }
@@ -172,35 +172,10 @@ impl Case {
         let frame = RayFrame::new(ray, axes(ray));
         answer(&Question {
             patch: &patch,
-            range: parts.clusters[0].offsets(0).map(f64::from),
+            range: parts.record(0).offsets().map(f64::from),
             frame: &frame,
             interval: [ray.tnear, ray.tfar],
             any: false,
-        })
-    }
-
-    fn ask_march<T>(&self, ray: &Ray, answer: impl FnOnce(&Problem<'_>, &RayFrame) -> T) -> T {
-        let Parts::Exact(parts) = &self.prisms.parts else {
-            panic!("another march");
-        };
-        let problem = Problem {
-            surface: &self.prisms.surface,
-            cluster: &parts.clusters[0],
-            lane: 0,
-            any: false,
-            interval: [ray.tnear, ray.tfar],
-            spread: 0.0,
-        };
-        answer(&problem, &RayFrame::new(ray, axes(ray)))
-    }
-
-    /// What the march finds.
-    fn march(&self, ray: &Ray) -> Option<Found> {
-        let found = self.ask_march(ray, search::<Portable>)?;
-        Some(Found {
-            t: found.t,
-            u: found.u,
-            v: found.v,
         })
     }
 }
@@ -267,14 +242,52 @@ fn beside(patch: &Patch<'_>, ray: &Ray, found: &Found) -> f64 {
     patch.point(found.u, found.v).position.distance(at)
 }
 
-/// What only one of them finds is there.
+/// A point of a ray's curve, by the triangle at height w in units of N'.
+struct Seen {
+    w: f64,
+    t: f64,
+    b: DVec3,
+    /// w |N'| - D; it is 0 on S.
+    above: f64,
+}
+
+impl Seen {
+    fn new(patch: &Patch<'_>, ray: &Ray, w: f64) -> Self {
+        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let [p, q, r] = [0, 1, 2].map(|k| patch.vertices[k] + w * patch.normals[k] - origin);
+        let areas = DVec3::new(
+            direction.dot(q.cross(r)),
+            direction.dot(r.cross(p)),
+            direction.dot(p.cross(q)),
+        );
+        let b = areas / areas.element_sum();
+        let at = b.x * p + b.y * q + b.z * r;
+        Self {
+            w,
+            t: at.dot(direction) / direction.length_squared(),
+            b,
+            above: w * patch.normal(b.y, b.z).length() - patch.displacement(b.y, b.z),
+        }
+    }
+
+    /// Whether it is well inside the triangle, and not where rounding makes all points alike.
+    fn is_inside(&self) -> bool {
+        self.b.min_element() > 1e-4 && self.b.max_element() < 1.0 && self.above.abs() > 1e-9
+    }
+}
+
+/// Heights that a triangle's curves are looked at.
+fn heights([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+    const SAMPLES: usize = 500;
+    (0..=SAMPLES).map(move |k| low + (high - low) * k as f64 / SAMPLES as f64)
+}
+
+/// Of triangles of all kinds, folded ones and slivers too.
 #[test]
-fn the_march_finds_the_same() {
-    /// World units: what f64 leaves of places where the ray is edge-on.
-    const NEAR: f64 = 1e-5;
+fn points_of_the_curve_are_on_the_side_that_crossings_say() {
     let mut random = Random(2);
-    let (mut hits, mut others) = (0, 0);
-    for _ in 0..2000 {
+    let (mut hits, mut changes) = (0, 0);
+    for _ in 0..600 {
         let case = Case::new(random.surface());
         let patch = case.prisms.surface.patch(0);
         // Where normals cancel, S jumps.
@@ -284,45 +297,112 @@ fn the_march_finds_the_same() {
         for _ in 0..20 {
             let ray = random.ray(&case.prisms.surface);
             let found = case.ask(&ray, |q| within::<Portable>(q, &Cells::ALL));
-            let march = case.march(&ray);
-            hits += usize::from(found.is_some());
-            let is_same = match (found, march) {
-                (Some(a), Some(b)) => (a.t - b.t).abs() * f64::from(ray.direction.length()) < NEAR,
-                (a, b) => a.is_some() == b.is_some(),
-            };
-            if !is_same {
-                // The march looks for pairs of crossings in one cell less closely.
-                others += 1;
-                let is_missed = found.is_some_and(|found| {
-                    beside(&patch, &ray, &found) < 1e-7 && march.is_none_or(|m| found.t < m.t)
-                });
-                assert!(is_missed, "{found:?} {march:?} {ray:?}");
+            if let Some(found) = &found {
+                hits += 1;
+                assert!(beside(&patch, &ray, found) < 1e-7, "{found:?} {ray:?}");
+            }
+            let range = case.ask(&ray, |q| q.range);
+            let mut before: Option<Seen> = None;
+            for w in heights(range) {
+                let now = Seen::new(&patch, &ray, w);
+                if let Some(before) = &before
+                    && before.is_inside()
+                    && now.is_inside()
+                    && (before.above > 0.0) != (now.above > 0.0)
+                {
+                    let (near, far) = (before.t.min(now.t), before.t.max(now.t));
+                    // The curve may turn back between the two.
+                    let is_plain = (now.b - before.b).abs().max_element() < 0.1;
+                    if is_plain && near > ray.tnear.into() && far < ray.tfar.into() {
+                        changes += 1;
+                        let is_found = found.is_some_and(|found| found.t <= far + 1e-6);
+                        assert!(is_found, "{found:?} {near} {far} at {} of {ray:?}", now.w);
+                    }
+                }
+                before = Some(now);
             }
         }
     }
-    assert!(hits > 8000 && others < 10, "{hits} {others}");
+    assert!(hits > 3000 && changes > 2000, "{hits} {changes}");
 }
 
+/// Where a ray passes a side, by bisection along its curve, and whether it certainly meets the wall there.
 #[test]
-fn walls_are_where_the_march_has_them() {
+fn walls_are_where_the_curve_passes_a_side_between_both_heights() {
     let mut random = Random(9);
-    let mut hits = 0;
+    let (mut hits, mut passed) = (0, 0);
     for _ in 0..300 {
         let open = DisplacedSurface::clone(&random.surface());
         let case = Case::new(Arc::new(open.with_seams(Seams::Closed)));
         let surface = &case.prisms.surface;
+        let patch = surface.patch(0);
         for _ in 0..20 {
             let ray = random.ray(surface);
             let found = case.ask(&ray, |q| walls::<Portable>(q, surface, 0, 0b111));
-            assert_eq!(
-                found,
-                case.ask_march(&ray, exact::walls::<Portable>),
-                "{ray:?}"
-            );
-            hits += usize::from(found.is_some());
+            if let Some(hit) = &found {
+                hits += 1;
+                let point = surface.point(hit.prim, hit.u, hit.v);
+                let off = point.position.distance(ray.at(hit.t));
+                assert!(off < 2e-5 * (1.0 + hit.t), "{off} {hit:?} {ray:?}");
+            }
+            let range = case.ask(&ray, |q| q.range);
+            for side in 0..3u8 {
+                for t in passages(surface, &patch, &ray, range, side) {
+                    if t > f64::from(ray.tnear) + 1e-5 && t < f64::from(ray.tfar) - 1e-5 {
+                        passed += 1;
+                        let is_found = found.is_some_and(|hit| f64::from(hit.t) <= t + 1e-5);
+                        assert!(is_found, "{found:?} {t} on side {side} of {ray:?}");
+                    }
+                }
+            }
         }
     }
-    assert!(hits > 1000, "{hits}");
+    assert!(hits > 1000 && passed > 1000, "{hits} {passed}");
+}
+
+/// Ray parameters at which the wall on a side is certainly met.
+fn passages(
+    surface: &DisplacedSurface,
+    patch: &Patch<'_>,
+    ray: &Ray,
+    range: [f64; 2],
+    side: u8,
+) -> Vec<f64> {
+    let Some((_, wall)) = surface.wall_on(0, side) else {
+        return Vec::new();
+    };
+    let ruled = Ruled::new(*patch, wall);
+    let outside = |w: f64| Seen::new(patch, ray, w).b[side.into()];
+    let all: Vec<f64> = heights(range).collect();
+    let mut met = Vec::new();
+    for pair in all.windows(2) {
+        let [mut low, mut high] = [pair[0], pair[1]];
+        let is_out = outside(low) < 0.0;
+        if is_out == (outside(high) < 0.0) {
+            continue;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if (outside(middle) < 0.0) == is_out {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let at = Seen::new(patch, ray, low);
+        // Not where the triangle turns over, nor at a corner.
+        let others = [1, 2].map(|k| at.b[(usize::from(side) + k) % 3]);
+        if at.b[side.into()].abs() > 1e-9 || others[0].min(others[1]) < 1e-4 {
+            continue;
+        }
+        let place = ruled.place(at.b.y, at.b.z);
+        let height = low * ruled.normal(place).length();
+        let [a, b] = ruled.heights(place);
+        if height > a.min(b) + 1e-6 && height < a.max(b) - 1e-6 {
+            met.push(at.t);
+        }
+    }
+    met
 }
 
 /// The height above S at points of the ray, by the exact inverse.

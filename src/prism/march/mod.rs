@@ -64,11 +64,12 @@ pub enum MarchError {
     /// There is no level of detail of what moves.
     #[error("the mesh moves, and what moves has no level of detail; leave it off (lod = \"off\")")]
     MotionHasNoLod,
-    /// More base triangles than the exact march's records can number.
-    #[error("the mesh has {found} triangles; the exact march takes at most {max}")]
-    TooManyTriangles {
-        /// Base triangles.
-        found: usize,
+    /// More primitives than a backend can number: blocks of 32x32 texels, and base triangles with walls.
+    #[error(
+        "the surface has more than {max} blocks of 32x32 texels and triangles with walls; \
+         repeat the map less often, or take the uniform march (march = \"uniform\")"
+    )]
+    TooManyPrimitives {
         /// Most that are supported.
         max: usize,
     },

@@ -9,7 +9,6 @@
 
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
-use std::sync::atomic::AtomicU32;
 
 use super::{Grid, LANES, Lanes, Task, nine};
 use crate::surface::{Entries, StoredTexels};
@@ -70,13 +69,6 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn from_bits(bits: &[AtomicU32; LANES]) -> Self {
-        // SAFETY: AVX is there; an unaligned load of 8 words from an array of 8. x86 reads each aligned 32-bit word of
-        // a vector load whole, so a word that another thread stores meanwhile is seen old or new.
-        Self(unsafe { _mm256_loadu_ps(bits.as_ptr().cast()) })
-    }
-
-    #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
         // SAFETY: FMA is there wherever an `Avx2` is.
         Self(unsafe { _mm256_fmadd_ps(self.0, a.0, b.0) })
@@ -119,32 +111,6 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn select_negative(self, a: Self, b: Self) -> Self {
-        // SAFETY: AVX is there wherever an `Avx2` is.
-        Self(unsafe { _mm256_blendv_ps(b.0, a.0, self.0) })
-    }
-
-    #[inline(always)]
-    fn choose(bits: u32, a: Self, b: Self) -> Self {
-        // SAFETY: AVX2 is there wherever an `Avx2` is.
-        unsafe {
-            let of_lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), of_lane);
-            let set = _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, of_lane));
-            Self(_mm256_blendv_ps(b.0, a.0, set))
-        }
-    }
-
-    #[inline(always)]
-    fn next_of(self, rest: Self) -> Self {
-        // SAFETY: AVX2 is there wherever an `Avx2` is.
-        unsafe {
-            let first = _mm256_broadcastss_ps(_mm256_castps256_ps128(rest.0));
-            Self(_mm256_blend_ps::<0x80>(self.next().0, first))
-        }
-    }
-
-    #[inline(always)]
     fn next(self) -> Self {
         // SAFETY: AVX2 is there wherever an `Avx2` is.
         unsafe {
@@ -170,56 +136,6 @@ impl Lanes for Avx2 {
     fn sign_mask(self) -> u32 {
         // SAFETY: AVX is there wherever an `Avx2` is.
         unsafe { _mm256_movemask_ps(self.0) as u32 }
-    }
-
-    #[inline(always)]
-    fn block_ranges(grid: &Grid<'_>, level: usize, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
-        let rows = grid.rows;
-        // SAFETY: AVX2 is there. Moved inside, 0 <= i < width and 0 <= j < height, so the four are stored pairs of the level: rows
-        // beyond the last level repeat it.
-        unsafe {
-            let last_i = _mm256_set1_epi32(rows.last[0][level] as i32);
-            let last_j = _mm256_set1_epi32(rows.last[1][level] as i32);
-            let i = [whole(i[0], last_i), whole(i[1], last_i)];
-            let j = [whole(j[0], last_j), whole(j[1], last_j)];
-            let width = _mm256_set1_epi32(rows.width[level] as i32);
-            let offset = _mm256_set1_epi32(rows.offset[level] as i32);
-            of_blocks(grid.levels[0].entries(), i, j, width, offset)
-        }
-    }
-
-    #[inline(always)]
-    fn block_ranges_by_size(
-        grid: &Grid<'_>,
-        is_inside: bool,
-        size: Self,
-        x: [Self; 2],
-        y: [Self; 2],
-    ) -> [Self; 2] {
-        let rows = grid.rows;
-        // SAFETY: AVX2 is there. The level is one of the pyramid's, and the blocks are moved inside it, so they are stored
-        // pairs: rows beyond the last level repeat it.
-        unsafe {
-            // The exponent of `size`, 1 for sizes from 2 to 4: the level is one less.
-            let exponent = _mm256_srli_epi32::<23>(_mm256_castps_si256(size.abs().0));
-            let level = _mm256_sub_epi32(exponent, _mm256_set1_epi32(128));
-            let last = _mm256_set1_epi32(rows.count as i32 - 1);
-            let level = _mm256_min_epi32(_mm256_max_epi32(level, _mm256_setzero_si256()), last);
-            let per_x = Self(looked_up(rows.per_block[0].as_ptr(), level));
-            let per_y = Self(looked_up(rows.per_block[1].as_ptr(), level));
-            let last_i = _mm256_castps_si256(looked_up(rows.last[0].as_ptr().cast(), level));
-            let last_j = _mm256_castps_si256(looked_up(rows.last[1].as_ptr().cast(), level));
-            let (mut end_i, mut end_j) = (x[1] * per_x, y[1] * per_y);
-            if !is_inside {
-                end_i = grid.within(end_i.floor(), Self(_mm256_cvtepi32_ps(last_i)));
-                end_j = grid.within(end_j.floor(), Self(_mm256_cvtepi32_ps(last_j)));
-            }
-            let i = [whole(x[0] * per_x, last_i), whole(end_i, last_i)];
-            let j = [whole(y[0] * per_y, last_j), whole(end_j, last_j)];
-            let width = _mm256_castps_si256(looked_up(rows.width.as_ptr().cast(), level));
-            let offset = _mm256_castps_si256(looked_up(rows.offset.as_ptr().cast(), level));
-            of_blocks(grid.levels[0].entries(), i, j, width, offset)
-        }
     }
 
     #[inline(always)]
@@ -376,160 +292,6 @@ fn four<T, const N: usize>(stored: &[T], index: usize) -> Option<&[T; N]> {
 fn whole(x: Avx2, last: __m256i) -> __m256i {
     // SAFETY: AVX2 is there wherever an `Avx2` is. What is no 32-bit number becomes i32::MIN, which is large without its sign.
     unsafe { _mm256_min_epu32(_mm256_cvttps_epi32(x.0), last) }
-}
-
-/// Entries of a table of sixteen words, by numbers from 0 to 15.
-///
-/// # Safety
-///
-/// Needs AVX2, and sixteen words at `table`.
-#[inline(always)]
-unsafe fn looked_up(table: *const f32, index: __m256i) -> __m256 {
-    // SAFETY: the caller's.
-    unsafe {
-        let low = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table), index);
-        let high = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.add(8)), index);
-        let is_high = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(index));
-        _mm256_blendv_ps(low, high, is_high)
-    }
-}
-
-/// The smallest and largest of four stored pairs: columns i and rows j of levels of some width that begin at `offset`.
-///
-/// # Safety
-///
-/// Needs AVX2, and columns and rows of stored pairs.
-#[inline(always)]
-unsafe fn of_blocks(
-    entries: &Entries,
-    [i0, i1]: [__m256i; 2],
-    j: [__m256i; 2],
-    width: __m256i,
-    offset: __m256i,
-) -> [Avx2; 2] {
-    // SAFETY: the caller's; loads of more than a pair end inside the pairs that `Entries` keeps after the last one. Edits
-    // meanwhile: as in `cell_corners`.
-    unsafe {
-        let (row0, row1) = (
-            _mm256_mullo_epi32(j[0], width),
-            _mm256_mullo_epi32(j[1], width),
-        );
-        let (row0, row1) = (
-            _mm256_add_epi32(row0, offset),
-            _mm256_add_epi32(row1, offset),
-        );
-        let (a, c) = (_mm256_add_epi32(row0, i0), _mm256_add_epi32(row1, i0));
-        let step = _mm256_sub_epi32(i1, i0);
-        let (b, d) = (_mm256_add_epi32(a, step), _mm256_add_epi32(c, step));
-        // 0 or 1, but for boxes across the edge of a map that repeats.
-        if _mm256_movemask_ps(_mm256_castsi256_ps(step)) != 0 {
-            return one_by_one(entries, [a, b, c, d]);
-        }
-        match entries {
-            Entries::U8(e) => {
-                // A pair and the next one in one load.
-                let pairs = e.as_ptr().cast();
-                let a = _mm256_i32gather_epi32::<2>(pairs, a);
-                let c = _mm256_i32gather_epi32::<2>(pairs, c);
-                let (low, high) = (_mm256_min_epu8(a, c), _mm256_max_epu8(a, c));
-                let bits = _mm256_slli_epi32::<4>(step);
-                let low = _mm256_min_epu8(low, _mm256_srlv_epi32(low, bits));
-                let high = _mm256_max_epu8(high, _mm256_srlv_epi32(high, bits));
-                [pair::<8>(low).0, pair::<8>(high).1]
-            }
-            Entries::U16(e) => {
-                let (a, c) = (neighbours(e, a), neighbours(e, c));
-                let low = [_mm256_min_epu16(a[0], c[0]), _mm256_min_epu16(a[1], c[1])];
-                let high = [_mm256_max_epu16(a[0], c[0]), _mm256_max_epu16(a[1], c[1])];
-                let ((low, next_low), (high, next_high)) = (unzipped(low), unzipped(high));
-                let is_next = Avx2(_mm256_castsi256_ps(_mm256_slli_epi32::<31>(step)));
-                let next_low = _mm256_castps_si256(is_next.select_negative(next_low, low).0);
-                let next_high = _mm256_castps_si256(is_next.select_negative(next_high, high).0);
-                let low = _mm256_min_epu16(_mm256_castps_si256(low.0), next_low);
-                let high = _mm256_max_epu16(_mm256_castps_si256(high.0), next_high);
-                [pair::<16>(low).0, pair::<16>(high).1]
-            }
-            Entries::F32(e) => {
-                let (low, high) = (e.as_ptr().cast::<f32>(), e.as_ptr().cast::<f32>().add(1));
-                let [a_low, b_low] = [
-                    Avx2(_mm256_i32gather_ps::<8>(low, a)),
-                    Avx2(_mm256_i32gather_ps::<8>(low, b)),
-                ];
-                let [c_low, d_low] = [
-                    Avx2(_mm256_i32gather_ps::<8>(low, c)),
-                    Avx2(_mm256_i32gather_ps::<8>(low, d)),
-                ];
-                let [a_high, b_high] = [
-                    Avx2(_mm256_i32gather_ps::<8>(high, a)),
-                    Avx2(_mm256_i32gather_ps::<8>(high, b)),
-                ];
-                let [c_high, d_high] = [
-                    Avx2(_mm256_i32gather_ps::<8>(high, c)),
-                    Avx2(_mm256_i32gather_ps::<8>(high, d)),
-                ];
-                [
-                    a_low.min(b_low).min(c_low.min(d_low)),
-                    a_high.max(b_high).max(c_high.max(d_high)),
-                ]
-            }
-        }
-    }
-}
-
-/// [`of_blocks`] for boxes across the edge of a map that repeats, which are few.
-///
-/// # Safety
-///
-/// Needs AVX2.
-#[inline(never)]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn one_by_one(entries: &Entries, index: [__m256i; 4]) -> [Avx2; 2] {
-    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
-    for index in index {
-        let mut numbers = [0i32; LANES];
-        // SAFETY: AVX is there; an unaligned store of 8 words into an array of 8.
-        unsafe { _mm256_storeu_si256(numbers.as_mut_ptr().cast(), index) };
-        for (l, number) in numbers.into_iter().enumerate() {
-            let (a, b) = entries.get(number as usize);
-            (low[l], high[l]) = (low[l].min(a), high[l].max(b));
-        }
-    }
-    [Avx2::from_array(low), Avx2::from_array(high)]
-}
-
-/// Stored 32-bit pairs, and behind each the next one: those of lanes 0, 1, 4, 5, and of the others.
-///
-/// # Safety
-///
-/// Needs AVX2, and numbers of stored pairs.
-#[inline(always)]
-unsafe fn neighbours(pairs: &[AtomicU32], index: __m256i) -> [__m256i; 2] {
-    let pairs = pairs.as_ptr().cast::<i64>();
-    // SAFETY: the caller's; as in `of_blocks`.
-    unsafe {
-        let index = _mm256_permute4x64_epi64::<0b11_01_10_00>(index);
-        [
-            _mm256_i32gather_epi64::<4>(pairs, _mm256_castsi256_si128(index)),
-            _mm256_i32gather_epi64::<4>(pairs, _mm256_extracti128_si256::<1>(index)),
-        ]
-    }
-}
-
-/// The first and the second halves of [`neighbours`], in the order of lanes.
-///
-/// # Safety
-///
-/// Needs AVX2.
-#[inline(always)]
-unsafe fn unzipped([a, b]: [__m256i; 2]) -> (Avx2, Avx2) {
-    // SAFETY: the caller has AVX2.
-    unsafe {
-        let (a, b) = (_mm256_castsi256_ps(a), _mm256_castsi256_ps(b));
-        (
-            Avx2(_mm256_shuffle_ps::<0b10_00_10_00>(a, b)),
-            Avx2(_mm256_shuffle_ps::<0b11_01_11_01>(a, b)),
-        )
-    }
 }
 
 /// The two lowest unsigned `BITS`-bit numbers of every lane.

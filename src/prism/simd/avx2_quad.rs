@@ -3,10 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
-use glam::Vec4;
-
-use super::quad::{Quad, Real, sampled_in_lanes};
-use crate::surface::DisplacementMap;
+use super::quad::Quad;
 
 #[derive(Clone, Copy)]
 pub struct Avx2Quad(__m256d);
@@ -29,26 +26,13 @@ lanewise!(Sub, sub, _mm256_sub_pd);
 lanewise!(Mul, mul, _mm256_mul_pd);
 lanewise!(Div, div, _mm256_div_pd);
 
-impl Real for Avx2Quad {
+impl Quad for Avx2Quad {
     #[inline(always)]
     fn splat(x: f64) -> Self {
         // SAFETY: called in AVX2 kernels only (module documentation).
         Self(unsafe { _mm256_set1_pd(x) })
     }
 
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        // SAFETY: AVX is there wherever an `Avx2Quad` is.
-        Self(unsafe { _mm256_sqrt_pd(self.0) })
-    }
-
-    #[inline(always)]
-    fn sampled(map: &DisplacementMap, texel: [Self; 2]) -> [Self; 3] {
-        sampled_in_lanes(map, texel)
-    }
-}
-
-impl Quad for Avx2Quad {
     #[inline(always)]
     fn from_array(x: [f64; 4]) -> Self {
         // SAFETY: called in AVX2 kernels only; an unaligned load of 4 doubles from an array of 4.
@@ -64,15 +48,9 @@ impl Quad for Avx2Quad {
     }
 
     #[inline(always)]
-    fn from_three([a, b, c]: [f32; 3]) -> Self {
-        // SAFETY: called in AVX2 kernels only.
-        Self(unsafe { _mm256_cvtps_pd(_mm_setr_ps(a, b, c, a)) })
-    }
-
-    #[inline(always)]
-    fn to_f32(self) -> Vec4 {
+    fn sqrt(self) -> Self {
         // SAFETY: AVX is there wherever an `Avx2Quad` is.
-        Vec4::from(unsafe { _mm256_cvtpd_ps(self.0) })
+        Self(unsafe { _mm256_sqrt_pd(self.0) })
     }
 
     #[inline(always)]

@@ -3,15 +3,14 @@
 mod fused;
 
 use std::ops::{Add, Div, Mul, Sub};
-use std::sync::atomic::{AtomicU32, Ordering};
 
-use glam::{BVec4A, Vec4};
+use glam::Vec4;
 
 use super::{Grid, LANES, Lanes, Task, nine};
 use crate::prism::steps;
-use crate::surface::{Entries, Level, StoredTexels, Texel};
+use crate::surface::{Entries, StoredTexels, Texel};
 
-/// `COUNTED`: every look into a map counts as a step of the march.
+/// `COUNTED`: steps of the march are counted.
 #[derive(Clone, Copy)]
 pub struct Portable<const COUNTED: bool = false>(Vec4, Vec4);
 
@@ -41,6 +40,13 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     }
 
     #[inline(always)]
+    fn step() {
+        if COUNTED {
+            steps::count();
+        }
+    }
+
+    #[inline(always)]
     fn splat(x: f32) -> Self {
         Self(Vec4::splat(x), Vec4::splat(x))
     }
@@ -56,13 +62,6 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
         self.0.write_to_slice(&mut out[..4]);
         self.1.write_to_slice(&mut out[4..]);
         out
-    }
-
-    #[inline(always)]
-    fn from_bits(bits: &[AtomicU32; LANES]) -> Self {
-        Self::from_array(std::array::from_fn(|l| {
-            f32::from_bits(bits[l].load(Ordering::Relaxed))
-        }))
     }
 
     #[inline(always)]
@@ -104,27 +103,6 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     }
 
     #[inline(always)]
-    fn select_negative(self, a: Self, b: Self) -> Self {
-        let four = |sign: Vec4, a, b| Vec4::select(sign.is_negative_mask(), a, b);
-        Self(four(self.0, a.0, b.0), four(self.1, a.1, b.1))
-    }
-
-    #[inline(always)]
-    fn choose(bits: u32, a: Self, b: Self) -> Self {
-        let four = |bits: u32, a, b| {
-            let set = |lane: u32| bits >> lane & 1 != 0;
-            Vec4::select(BVec4A::new(set(0), set(1), set(2), set(3)), a, b)
-        };
-        Self(four(bits, a.0, b.0), four(bits >> 4, a.1, b.1))
-    }
-
-    #[inline(always)]
-    fn next_of(self, rest: Self) -> Self {
-        let moved = self.next();
-        Self(moved.0, moved.1.with_w(rest.0.x))
-    }
-
-    #[inline(always)]
     fn next(self) -> Self {
         let (a, b) = (self.0, self.1);
         Self(Vec4::new(a.y, a.z, a.w, b.x), Vec4::new(b.y, b.z, b.w, b.w))
@@ -141,47 +119,7 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     }
 
     #[inline(always)]
-    fn block_ranges(grid: &Grid<'_>, level: usize, i: [Self; 2], j: [Self; 2]) -> [Self; 2] {
-        if COUNTED {
-            steps::count();
-        }
-        let (i, j) = (i.map(Self::to_array), j.map(Self::to_array));
-        let level = &grid.levels[level];
-        of_blocks(|l| (level, i.map(|i| i[l]), j.map(|j| j[l])))
-    }
-
-    #[inline(always)]
-    fn block_ranges_by_size(
-        grid: &Grid<'_>,
-        is_inside: bool,
-        size: Self,
-        x: [Self; 2],
-        y: [Self; 2],
-    ) -> [Self; 2] {
-        if COUNTED {
-            steps::count();
-        }
-        let size = size.to_array();
-        let level = |l: usize| &grid.levels[grid.level(size[l])];
-        let row = |value: &dyn Fn(&Level) -> f32| {
-            Self::from_array(std::array::from_fn(|l| value(level(l))))
-        };
-        let per_block = [0, 1].map(|axis| row(&|level| 1.0 / (1u32 << level.shift()[axis]) as f32));
-        let mut i = x.map(|x| x * per_block[0]);
-        let mut j = y.map(|y| y * per_block[1]);
-        if !is_inside {
-            i[1] = grid.within(i[1].floor(), row(&|level| (level.width() - 1) as f32));
-            j[1] = grid.within(j[1].floor(), row(&|level| (level.height() - 1) as f32));
-        }
-        let (i, j) = (i.map(Self::to_array), j.map(Self::to_array));
-        of_blocks(|l| (level(l), i.map(|i| i[l]), j.map(|j| j[l])))
-    }
-
-    #[inline(always)]
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4] {
-        if COUNTED {
-            steps::count();
-        }
         let (i, j) = (i.to_array(), j.to_array());
         let corners = match grid.texels {
             StoredTexels::U8(t) => corners::<u8>(t, grid, i, j),
@@ -193,9 +131,6 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
 
     #[inline(always)]
     fn pairs(entries: &Entries, first: [usize; 2]) -> [Self; 2] {
-        if COUNTED {
-            steps::count();
-        }
         let mut pairs = [[0.0; LANES]; 2];
         for lane in 0..LANES {
             let from = first[lane / 4];
@@ -208,9 +143,6 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
 
     #[inline(always)]
     fn texel_rows(texels: &StoredTexels, index: usize) -> [Self; 2] {
-        if COUNTED {
-            steps::count();
-        }
         let row = match texels {
             StoredTexels::U8(t) => row::<u8>(t, index),
             StoredTexels::U16(t) => row::<u16>(t, index),
@@ -235,25 +167,6 @@ fn whole(x: f32, last: usize) -> usize {
     const END: f32 = 2_147_483_648.0;
     let whole = if x.abs() < END { x as i32 } else { i32::MIN };
     (whole as u32 as usize).min(last)
-}
-
-/// The range of four blocks for each lane.
-#[inline(always)]
-fn of_blocks<'a, const COUNTED: bool>(
-    blocks: impl Fn(usize) -> (&'a Level, [f32; 2], [f32; 2]),
-) -> [Portable<COUNTED>; 2] {
-    let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
-    for l in 0..LANES {
-        let (level, i, j) = blocks(l);
-        let i = i.map(|i| whole(i, level.width() - 1));
-        let j = j.map(|j| whole(j, level.height() - 1));
-        let ranges = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(a, b)| level.get(i[a], j[b]));
-        (low[l], high[l]) = ranges[0];
-        for (a, b) in &ranges[1..] {
-            (low[l], high[l]) = (low[l].min(*a), high[l].max(*b));
-        }
-    }
-    [low, high].map(Portable::from_array)
 }
 
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! What lanes read as it is stored: pairs of the pyramid, and texels in a row.
 
 use super::*;
-use crate::surface::Texels;
+use crate::surface::{DisplacementMap, Texels, Wrap};
 
 /// Of every kind, of several levels, and of sides that no block divides.
 fn maps() -> [DisplacementMap; 3] {

@@ -29,7 +29,7 @@ use glam::DVec3;
 
 use super::{Polygon, TexelBox};
 use crate::ray::Aabb;
-use crate::surface::{DisplacedSurface, MovingSurface, Patch};
+use crate::surface::{MovingSurface, Patch};
 
 /// By how much N' may be off its definition where vertex normals are rounded to f32, at steps or between.
 const NORMALS: f64 = 1e-6;
@@ -39,26 +39,6 @@ const VERTICES: f64 = 1e-7;
 
 /// The least and the largest.
 type Interval = [f64; 2];
-
-impl DisplacedSurface {
-    /// A box around the part of S over a base triangle where texel coordinates are in `block` and D is in `range`. `None` where the triangle
-    /// has nothing there.
-    ///
-    /// # Panics
-    ///
-    /// For a triangle that is not there.
-    #[cfg_attr(not(test), expect(dead_code, reason = "no backend traces blocks yet"))]
-    pub(crate) fn block_bounds(
-        &self,
-        prim: u32,
-        block: &TexelBox,
-        range: [f64; 2],
-    ) -> Option<Aabb> {
-        let patch = self.patch(prim);
-        let polygon = Polygon::of(&patch, &block.widened(patch.texels));
-        (!polygon.is_empty()).then(|| at_ends(&polygon, [&patch; 2], range)[0])
-    }
-}
 
 impl MovingSurface {
     /// A box for the part of S over a base triangle where texel coordinates are in `block` and D is in `range`, at a time step. Between two
