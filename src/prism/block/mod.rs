@@ -23,7 +23,7 @@ mod record;
 mod tests;
 mod view;
 
-pub use cut::{Cutter, Whole};
+pub use cut::Cutter;
 pub use hit::{Ask, Crossing, nearest};
 pub use outline::outline;
 pub use record::{Block, Record};
