@@ -202,7 +202,7 @@ typedef struct prismarch_surface_desc {
   /* Version 0.1.0 ends here. ------------------------------------------------ */
 
   /* Whether filters will be set for geometries of the surface (rtcSetGeometryIntersectFilterFunction, ...OccludedFilterFunction), which
-   * prismarch cannot see. false lets packets be met side by side and occlusion rays end at any hit; a geometry's filter is then never
+   * prismarch cannot see. false lets occlusion rays end at any hit, and packets be met without a look at filters; a geometry's filter is then never
    * asked. (The filter of a call's context with Embree 3 is seen, and asked all the same.) true */
   bool has_filter;
   uint8_t reserved[7]; /* 0 */

@@ -44,7 +44,7 @@ pub struct RawOptions {
     /// Where faults are kept, also those of other geometries.
     pub faults: Arc<Faults>,
     /// Whether filters may be set for the geometry, which cannot be seen from a hit test. Where none will be, packets are met
-    /// side by side and occlusion rays end at any hit; one that is set all the same may not be asked.
+    /// without a look at filters and occlusion rays end at any hit; one that is set all the same may not be asked.
     pub has_filter: bool,
 }
 
