@@ -44,8 +44,9 @@ pub struct Level {
     shift: [u32; 2],
     width: usize,
     height: usize,
-    /// Where the level's entries begin among those of all.
+    /// Where the level's entries begin among those of all, and their order there.
     offset: usize,
+    order: Order,
     entries: Arc<Entries>,
 }
 
@@ -81,21 +82,72 @@ impl Level {
         self.entries.get(self.index(i, j))
     }
 
-    /// The pairs of all levels as stored, level by level and row by row: that of block (i, j) of this one is
-    /// [`Self::offset`] + j [`Self::width`] + i.
+    /// The pairs of all levels as stored, level by level: see [`Order`].
     pub(crate) fn entries(&self) -> &Entries {
         &self.entries
     }
 
-    /// Where the level's pairs begin in [`Self::entries`].
-    pub(crate) fn offset(&self) -> usize {
-        self.offset
+    /// Where the pairs of tile (i, j) of 32x32 cells begin in [`Self::entries`]; of the two finest levels.
+    #[inline(always)]
+    pub(crate) fn tile(&self, i: usize, j: usize) -> usize {
+        self.offset + self.order.tile(i, j)
     }
 
     #[inline]
     fn index(&self, i: usize, j: usize) -> usize {
         assert!(i < self.width && j < self.height, "block outside the map");
-        self.offset + j * self.width + i
+        self.offset + self.order.index(i, j)
+    }
+}
+
+/// The order of a level's pairs.
+///
+/// Those of the two finest levels are kept by tiles of 32x32 cells, which a block of the exact march reads at once: eight pairs of the second level, row by row, two
+/// across; and 32 of the finest, four and four, as the second level's are made of them.
+#[derive(Clone, Copy, Debug)]
+enum Order {
+    /// Tiles across.
+    Fours(usize),
+    Eights(usize),
+    /// Pairs across.
+    Rows(usize),
+}
+
+impl Order {
+    /// Of level `level`, so many pairs across and up; and how many are stored.
+    fn new(level: usize, width: usize, height: usize) -> (Self, usize) {
+        match level {
+            0 => {
+                let tiles = width.div_ceil(4);
+                (Self::Fours(tiles), 32 * tiles * height.div_ceil(8))
+            }
+            1 => {
+                let tiles = width.div_ceil(2);
+                (Self::Eights(tiles), 8 * tiles * height.div_ceil(4))
+            }
+            _ => (Self::Rows(width), width * height),
+        }
+    }
+
+    #[inline(always)]
+    fn tile(self, i: usize, j: usize) -> usize {
+        match self {
+            Self::Fours(tiles) => 32 * (j * tiles + i),
+            Self::Eights(tiles) => 8 * (j * tiles + i),
+            Self::Rows(_) => 0,
+        }
+    }
+
+    #[inline]
+    fn index(self, i: usize, j: usize) -> usize {
+        match self {
+            Self::Fours(_) => {
+                let part = 2 * (j / 2 % 4) + i / 2 % 2;
+                self.tile(i / 4, j / 8) + 4 * part + 2 * (j % 2) + i % 2
+            }
+            Self::Eights(_) => self.tile(i / 2, j / 4) + 2 * (j % 4) + i % 2,
+            Self::Rows(width) => j * width + i,
+        }
     }
 }
 

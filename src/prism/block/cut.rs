@@ -5,7 +5,6 @@
 
 use glam::DVec2;
 
-use super::place::PART;
 use super::{Block, Record, SIDE};
 use crate::surface::{DisplacementMap, Patch};
 
@@ -81,7 +80,7 @@ impl Cutter {
 
     /// The intervals of cells that blocks take up along an axis, [from, to).
     fn starts(&self, axis: usize, low: f64, high: f64) -> impl Iterator<Item = [i64; 2]> {
-        let (n, unit) = (self.size[axis], i64::from(PART[axis]));
+        let (n, unit) = (self.size[axis], i64::from(SIDE));
         let first = low.floor() as i64;
         // Where an entry begins, in the period of the map that the first cell is in.
         let mut from = first - first.rem_euclid(n) % unit;

@@ -7,7 +7,7 @@ use super::cull::met;
 use super::leaf::{Leaf, Rows};
 use super::middle::Heights;
 use super::newton::{Cell, land};
-use super::place::{PART, PARTS, Place};
+use super::place::{PART, PARTS, Place, leaf_of, leaves_of};
 use super::view::View;
 use super::{Block, LEAF, Record, SIDE};
 use crate::prism::judge::{Cells, Found, Question, within};
@@ -62,103 +62,84 @@ pub fn nearest<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> Option<Crossing> {
         search.decide::<L>(place.all());
         return search.nearest;
     };
-    let mut leaves = Leaves::new();
-    leaves.cull::<L>(&place, &view, &heights);
-    while let Some(index) = leaves.first() {
-        if leaves.begins[index] > view.interval[1] {
+    let mut leaves = Leaves::new::<L>(&place, &view, &heights);
+    while let Some(leaf) = leaves.first() {
+        if leaves.begin(leaf) > view.interval[1] {
             break;
         }
-        if search.leaf::<L>(&mut view, &heights, &place, &leaves.parts[index]) {
+        let rise = leaves.rise(leaf) * heights.scale.abs();
+        if search.leaf::<L>(&mut view, &heights, &place, leaves.place(leaf), rise) {
             break;
         }
     }
     search.nearest
 }
 
-/// The leaves that a ray may meet.
+/// The leaves that a ray may meet: eight for every two parts of the block that it may meet.
 struct Leaves {
-    begins: [f32; MOST_LEAVES],
-    /// Where, in leaves; and the range of the stored texels.
-    parts: [Part; MOST_LEAVES],
-    count: usize,
+    begins: [[f32; LANES]; MOST_GROUPS],
+    /// The range of their stored texels.
+    range: [[[f32; LANES]; MOST_GROUPS]; 2],
+    parts: [[u32; 2]; MOST_GROUPS],
     waiting: u32,
 }
 
-#[derive(Clone, Copy)]
-struct Part {
-    place: [u32; 2],
-    range: [f32; 2],
-}
-
-const MOST_LEAVES: usize = (SIDE / LEAF[0] * (SIDE / LEAF[1])) as usize;
+const MOST_GROUPS: usize = PARTS.len() / 2;
 
 impl Leaves {
+    /// First the parts of the map's second level are held against the ray, then their leaves.
     #[inline(always)]
-    fn new() -> Self {
-        Self {
-            begins: [0.0; MOST_LEAVES],
-            parts: [Part {
-                place: [0; 2],
-                range: [0.0; 2],
-            }; MOST_LEAVES],
-            count: 0,
+    fn new<L: Lanes>(place: &Place<'_>, view: &View, heights: &Heights) -> Self {
+        let mut leaves = Self {
+            begins: [[0.0; LANES]; MOST_GROUPS],
+            range: [[[0.0; LANES]; MOST_GROUPS]; 2],
+            parts: [[0; 2]; MOST_GROUPS],
             waiting: 0,
-        }
-    }
-
-    /// The leaves that the ray may meet: first the parts of the map's second level, then theirs.
-    #[inline(always)]
-    fn cull<L: Lanes>(&mut self, place: &Place<'_>, view: &View, heights: &Heights) {
+        };
         let (bits, _) = met(view, heights, &place.parts::<L>(&view.middle));
-        let mut waiting = bits & place.there(&PARTS, PART);
-        while waiting != 0 {
-            let one = waiting.trailing_zeros();
-            waiting &= waiting - 1;
-            let other = (waiting != 0).then(|| waiting.trailing_zeros());
-            waiting &= waiting.wrapping_sub(1);
-            let used = if other.is_some() { 0xff } else { 0x0f };
-            let other = other.unwrap_or(one);
-            let places: [[u32; 2]; LANES] = std::array::from_fn(|lane| {
-                let part = if lane < 4 { one } else { other };
-                let lane = lane as u32;
-                [
-                    2 * (part & 1) + (lane & 1),
-                    2 * (part >> 1) + (lane >> 1 & 1),
-                ]
-            });
-            let parts = place.leaves::<L>(&places, &view.middle);
-            let (bits, begins) = met(view, heights, &parts);
-            let bits = bits & place.there(&places, LEAF) & used;
-            self.push(
-                bits,
-                &places,
-                begins.to_array(),
-                [parts.range[0].to_array(), parts.range[1].to_array()],
-            );
+        let mut parts = bits & place.there(&PARTS, PART);
+        for group in 0..MOST_GROUPS {
+            if parts == 0 {
+                break;
+            }
+            let one = parts.trailing_zeros();
+            parts &= parts - 1;
+            let (other, used) = if parts == 0 {
+                (one, 0x0f)
+            } else {
+                (parts.trailing_zeros(), 0xff)
+            };
+            parts &= parts.wrapping_sub(1);
+            let eight = place.leaves::<L>([one, other], &view.middle);
+            let (bits, begins) = met(view, heights, &eight);
+            let bits = bits & used & place.there(&leaves_of([one, other]), LEAF);
+            leaves.begins[group] = begins.to_array();
+            leaves.range[0][group] = eight.range[0].to_array();
+            leaves.range[1][group] = eight.range[1].to_array();
+            leaves.parts[group] = [one, other];
+            leaves.waiting |= bits << (LANES * group);
         }
+        leaves
     }
 
+    /// The ray parameter before which a leaf is not met.
     #[inline(always)]
-    fn push(
-        &mut self,
-        bits: u32,
-        places: &[[u32; 2]; LANES],
-        begins: [f32; LANES],
-        [low, high]: [[f32; LANES]; 2],
-    ) {
-        let mut bits = bits;
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize % LANES;
-            bits &= bits - 1;
-            let index = self.count % MOST_LEAVES;
-            self.begins[index] = begins[lane];
-            self.parts[index] = Part {
-                place: places[lane],
-                range: [low[lane], high[lane]],
-            };
-            self.waiting |= 1 << index;
-            self.count += 1;
-        }
+    fn begin(&self, leaf: usize) -> f32 {
+        self.begins.as_flattened()[leaf]
+    }
+
+    /// The range of a leaf's stored texels.
+    #[inline(always)]
+    fn rise(&self, leaf: usize) -> f32 {
+        let [low, high] = &self.range;
+        high.as_flattened()[leaf] - low.as_flattened()[leaf]
+    }
+
+    /// Where a leaf is among the block's.
+    #[inline(always)]
+    fn place(&self, leaf: usize) -> [u32; 2] {
+        let lane = leaf % LANES;
+        leaf_of(self.parts[leaf / LANES][lane / 4], lane as u32 % 4)
     }
 
     /// Takes the one that begins first.
@@ -172,7 +153,7 @@ impl Leaves {
         while rest != 0 {
             let index = rest.trailing_zeros() as usize;
             rest &= rest - 1;
-            if self.begins[index] < self.begins[best] {
+            if self.begin(index) < self.begin(best) {
                 best = index;
             }
         }
@@ -206,15 +187,15 @@ impl<'a> Search<'a> {
         view: &mut View,
         heights: &Heights,
         place: &Place<'_>,
-        part: &Part,
+        leaf: [u32; 2],
+        rise: f32,
     ) -> bool {
-        let [i, j] = [0, 1].map(|k: usize| part.place[k] * LEAF[k]);
+        let [i, j] = [leaf[0] * LEAF[0], leaf[1] * LEAF[1]];
         let [s, t] = place.from_middle(&view.middle, [i, j], LEAF);
         let Some(leaf) = Leaf::new(view, heights, s, t) else {
             self.decide::<L>(place.part(i, j));
             return self.ask.any && self.nearest.is_some();
         };
-        let rise = (part.range[1] - part.range[0]) * heights.scale.abs();
         match place.stored(i, j) {
             Some(texels) => self.cells::<L>(view, heights, place, &leaf, rise, [i, j], &texels),
             None => {

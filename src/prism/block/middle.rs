@@ -137,7 +137,16 @@ impl Middle {
     }
 
     #[inline(always)]
-    pub fn new(record: &Record, block: Block, heights: &Heights) -> Self {
+    pub fn new<L: Lanes>(record: &Record, block: Block, heights: &Heights) -> Self {
+        // The six vectors side by side: |x| + |y| + |z|, and lengths.
+        let (x, y, z) = (
+            L::from_array(*record.along(0)),
+            L::from_array(*record.along(1)),
+            L::from_array(*record.along(2)),
+        );
+        let [_, p_s_sum, p_t_sum, _, n_s_sum, n_t_sum, ..] =
+            (x.abs() + y.abs() + z.abs()).to_array();
+        let [.., n_s_length, n_t_length, _, _] = (x * x + y * y + z * z).sqrt().to_array();
         let first = record.first();
         let mut place = [0.0; 2];
         let mut half = [0.0; 2];
@@ -148,14 +157,13 @@ impl Middle {
             (place[axis], half[axis]) = (0.5 * (from + to), 0.5 * (to - from).max(0.0));
         }
         let (ds, dt) = (place[0] - first[0], place[1] - first[1]);
-        let [p_s, p_t] = [vector(record, 1), vector(record, 2)];
         let [n, n_s, n_t] = [vector(record, 3), vector(record, 4), vector(record, 5)];
         let normal = Affine {
             c: n + ds * n_s + dt * n_t,
             s: n_s,
             t: n_t,
         };
-        let spread = [n_s.length(), n_t.length()];
+        let spread = [n_s_length, n_t_length];
         let k = 1.0 / normal.c.length();
         let slope = -k * k * k;
         // 1/|N'| along a line is the generating function of the Legendre polynomials, of which none exceeds 1: terms shrink by `turn`.
@@ -167,9 +175,8 @@ impl Middle {
             s,
             t,
         };
-        let sum = |v: Vec3| v.abs().element_sum();
         let (far_s, far_t) = (ds.abs() + FARTHEST, dt.abs() + FARTHEST);
-        let along_normals = 2.0 + far_s * sum(n_s) + far_t * sum(n_t);
+        let along_normals = 2.0 + far_s * n_s_sum + far_t * n_t_sum;
         Self {
             place,
             from: [ds, dt],
@@ -184,7 +191,7 @@ impl Middle {
             },
             k_off: k * turn * turn / least + 1e-6 * k,
             least,
-            size: far_s * sum(p_s) + far_t * sum(p_t) + heights.most * k / least * along_normals,
+            size: far_s * p_s_sum + far_t * p_t_sum + heights.most * k / least * along_normals,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::cull::{Offsets, above, beyond};
 use super::middle::{Heights, Middle};
-use super::place::Place;
+use super::place::{PARTS, Place, leaves_of};
 use super::view::rounding;
 use super::{Block, LEAF, Record, SIDE};
 use crate::prism::exact::hull;
@@ -20,7 +20,7 @@ pub fn outline(
     type L = Portable;
     let heights = Heights::new(surface).with_room(room, surface.map().unit());
     let place = Place::new(surface.map(), record, block);
-    let middle = Middle::new(record, block, &heights);
+    let middle = Middle::new::<L>(record, block, &heights);
     if !middle.is_tame() {
         return hull(&surface.patch(block.triangle), [0, 1, 2], record.offsets());
     }
@@ -28,19 +28,16 @@ pub fn outline(
     let far = axes.iter().map(|axis| axis.p.c.abs()).sum::<f32>();
     let noise = rounding(middle.size + far);
     let mut bounds = Aabb::EMPTY;
-    for group in 0..(SIDE / LEAF[0] * SIDE / LEAF[1]) / LANES as u32 {
-        let places: [[u32; 2]; LANES] = std::array::from_fn(|lane| {
-            let leaf = LANES as u32 * group + lane as u32;
-            [leaf % (SIDE / LEAF[0]), leaf / (SIDE / LEAF[0])]
-        });
-        let mut parts = place.leaves::<L>(&places, &middle);
+    for group in 0..PARTS.len() as u32 / 2 {
+        let two = [2 * group, 2 * group + 1];
+        let mut parts = place.leaves::<L>(two, &middle);
         if let Some((low, high)) = room {
             let unit = surface.map().unit();
             let [a, b] = parts.range;
             parts.range = [a.min(L::splat(low * unit)), b.max(L::splat(high * unit))];
         }
         let outside = above(beyond(&parts, &middle.b));
-        let used = place.there(&places, LEAF) & !outside;
+        let used = place.there(&leaves_of(two), LEAF) & !outside;
         if used == 0 {
             continue;
         }

@@ -69,13 +69,14 @@ impl<'m> Place<'m> {
     /// Parts of the block, each of two by two leaves.
     #[inline(always)]
     pub fn parts<L: Lanes>(&self, middle: &Middle) -> Parts<L> {
-        self.some(1, PART, &PARTS, middle)
+        self.some(1, PART, [0, 4], &PARTS, middle)
     }
 
-    /// Leaves of the block, by their places among them.
+    /// The leaves of two parts.
     #[inline(always)]
-    pub fn leaves<L: Lanes>(&self, places: &[[u32; 2]; LANES], middle: &Middle) -> Parts<L> {
-        self.some(0, LEAF, places, middle)
+    pub fn leaves<L: Lanes>(&self, parts: [u32; 2], middle: &Middle) -> Parts<L> {
+        let numbers = parts.map(|part| 4 * part as usize);
+        self.some(0, LEAF, numbers, &leaves_of(parts), middle)
     }
 
     #[inline(always)]
@@ -83,6 +84,7 @@ impl<'m> Place<'m> {
         &self,
         level: usize,
         size: [u32; 2],
+        numbers: [usize; 2],
         places: &[[u32; 2]; LANES],
         middle: &Middle,
     ) -> Parts<L> {
@@ -93,7 +95,7 @@ impl<'m> Place<'m> {
             s: L::from_array(along(0)) + L::splat(first[0]),
             t: L::from_array(along(1)) + L::splat(first[1]),
             half: size.map(|n| n as f32 / 2.0),
-            range: self.ranges(level, size, places),
+            range: self.ranges(level, size, numbers, places),
         }
     }
 
@@ -111,15 +113,26 @@ impl<'m> Place<'m> {
         bits
     }
 
-    /// The smallest and largest texels of parts of the size of a level's entries.
+    /// The smallest and largest texels of parts of the size of a level's entries: four from one number among these on, and four from another.
     #[inline(always)]
-    fn ranges<L: Lanes>(&self, level: usize, size: [u32; 2], places: &[[u32; 2]; LANES]) -> [L; 2] {
+    fn ranges<L: Lanes>(
+        &self,
+        level: usize,
+        size: [u32; 2],
+        numbers: [usize; 2],
+        places: &[[u32; 2]; LANES],
+    ) -> [L; 2] {
         let levels = self.map.pyramid().levels();
         if let (Some([x, y]), Some(level)) = (self.stored, levels.get(level)) {
-            let width = level.width() as u32;
-            let base = y as u32 / size[1] * width + x as u32 / size[0] + level.offset() as u32;
-            return L::entries(level.entries(), places.map(|[i, j]| base + j * width + i));
+            let tile = level.tile(x / SIDE as usize, y / SIDE as usize);
+            return L::pairs(level.entries(), numbers.map(|number| tile + number));
         }
+        self.continued_ranges(size, places)
+    }
+
+    /// The same wherever the block lies.
+    #[cold]
+    fn continued_ranges<L: Lanes>(&self, size: [u32; 2], places: &[[u32; 2]; LANES]) -> [L; 2] {
         let mut ranges = [[0.0; LANES]; 2];
         for (lane, place) in places.iter().enumerate() {
             let at = |k: usize| (self.first[k] + i64::from(place[k] * size[k])) as f64;
@@ -147,6 +160,18 @@ pub const PARTS: [[u32; 2]; LANES] = [
     [0, 3],
     [1, 3],
 ];
+
+/// The places of the leaves of two parts, among the block's leaves.
+#[inline(always)]
+pub fn leaves_of(parts: [u32; 2]) -> [[u32; 2]; LANES] {
+    std::array::from_fn(|lane| leaf_of(parts[lane / 4], lane as u32 % 4))
+}
+
+/// The place of leaf `leaf` of a part.
+#[inline(always)]
+pub fn leaf_of(part: u32, leaf: u32) -> [u32; 2] {
+    [2 * (part & 1) + (leaf & 1), 2 * (part >> 1) + (leaf >> 1)]
+}
 
 /// The texels of a leaf that is stored as it lies.
 pub struct Stored<'m> {

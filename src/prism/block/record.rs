@@ -35,7 +35,7 @@ const _: () = assert!(size_of::<Record>() == 108);
 const UNIT: i64 = 4;
 
 /// Texels from a corner to where its triangle may begin: blocks may begin as much before the triangle.
-pub const BEFORE: i64 = 16;
+pub const BEFORE: i64 = 32;
 
 /// The upper half of a float's bits, of one that is not less.
 fn above(x: f32) -> u32 {

@@ -55,7 +55,7 @@ impl View {
         frame: &RayFrame,
         ray: &Ray,
     ) -> Option<Self> {
-        let middle = Middle::new(record, block, heights);
+        let middle = Middle::new::<L>(record, block, heights);
         let [ds, dt] = middle.from();
         let [ax, ay, az] = frame.axes;
         let (wx, wy, wz) = (record.along(ax), record.along(ay), record.along(az));

@@ -182,28 +182,42 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn entries(entries: &Entries, index: [u32; LANES]) -> [Self; 2] {
-        let last = entries.count() - 1;
-        // SAFETY: AVX2 is there. Moved down to the last, the numbers are of stored pairs, of which there are fewer than 2^31 by
-        // `DisplacementMap::MAX_SIDE`; the 32-bit load of a pair of bytes ends inside the pairs that `Entries` keeps after the
-        // last one. Edits meanwhile: as in `cell_corners`; a pair of floats may be one old and one new.
+    fn pairs(entries: &Entries, [a, b]: [usize; 2]) -> [Self; 2] {
+        let zeros = [Self::splat(0.0); 2];
+        // SAFETY: AVX2 is there. Loads of four pairs from slices of as many. Edits meanwhile: as in `cell_corners`; a pair of floats may be one
+        // old and one new.
         unsafe {
-            let index = _mm256_loadu_si256(index.as_ptr().cast());
-            let index = _mm256_min_epu32(index, _mm256_set1_epi32(last as i32));
-            let (low, high) = match entries {
-                Entries::U8(e) => pair::<8>(_mm256_i32gather_epi32::<2>(e.as_ptr().cast(), index)),
+            match entries {
+                Entries::U8(e) => {
+                    let (Some(a), Some(b)) = (four::<_, 4>(e, a), four::<_, 4>(e, b)) else {
+                        return zeros;
+                    };
+                    let a = _mm_loadl_epi64(a.as_ptr().cast());
+                    let b = _mm_loadl_epi64(b.as_ptr().cast());
+                    let both = _mm256_cvtepu16_epi32(_mm_unpacklo_epi64(a, b));
+                    pair::<8>(both).into()
+                }
                 Entries::U16(e) => {
-                    pair::<16>(_mm256_i32gather_epi32::<4>(e.as_ptr().cast(), index))
+                    let (Some(a), Some(b)) = (four::<_, 4>(e, a), four::<_, 4>(e, b)) else {
+                        return zeros;
+                    };
+                    let a = _mm_loadu_si128(a.as_ptr().cast());
+                    let b = _mm_loadu_si128(b.as_ptr().cast());
+                    pair::<16>(_mm256_set_m128i(b, a)).into()
                 }
                 Entries::F32(e) => {
-                    let low = e.as_ptr().cast::<f32>();
-                    (
-                        Self(_mm256_i32gather_ps::<8>(low, index)),
-                        Self(_mm256_i32gather_ps::<8>(low.add(1), index)),
-                    )
+                    let (Some(a), Some(b)) = (four::<_, 8>(e, 2 * a), four::<_, 8>(e, 2 * b))
+                    else {
+                        return zeros;
+                    };
+                    let a = _mm256_loadu_ps(a.as_ptr().cast());
+                    let b = _mm256_loadu_ps(b.as_ptr().cast());
+                    // Two of a, two of b, two of a, two of b.
+                    let low = _mm256_shuffle_ps::<0b10_00_10_00>(a, b);
+                    let high = _mm256_shuffle_ps::<0b11_01_11_01>(a, b);
+                    [Self(in_order(low)), Self(in_order(high))]
                 }
-            };
-            [low, high]
+            }
         }
     }
 
@@ -251,6 +265,26 @@ impl Lanes for Avx2 {
             }
         }
     }
+}
+
+/// The second pair of lanes and the third change places.
+///
+/// # Safety
+///
+/// Needs AVX2.
+#[inline(always)]
+unsafe fn in_order(x: __m256) -> __m256 {
+    // SAFETY: the caller has AVX2.
+    unsafe {
+        let pairs = _mm256_castps_pd(x);
+        _mm256_castpd_ps(_mm256_permute4x64_pd::<0b11_01_10_00>(pairs))
+    }
+}
+
+/// `N` words from `index` on.
+#[inline(always)]
+fn four<T, const N: usize>(stored: &[T], index: usize) -> Option<&[T; N]> {
+    stored.get(index..)?.first_chunk()
 }
 
 /// The whole part of numbers from 0 to `last`; others, and NaN, become `last`.

@@ -112,8 +112,8 @@ pub(crate) trait Lanes:
     /// The stored texels at the corners (0,0) (1,0) (0,1) (1,1) of the cells (i, j), integers in float lanes.
     /// Cells outside the grid, and NaN, are moved inside first.
     fn cell_corners(grid: &Grid<'_>, i: Self, j: Self) -> [Self; 4];
-    /// Smallest and largest stored texel of blocks, given by the numbers of their pairs; beyond the last pair there is that one.
-    fn entries(entries: &Entries, index: [u32; LANES]) -> [Self; 2];
+    /// Smallest and largest of stored pairs: four from each number on; zeros where there are fewer.
+    fn pairs(entries: &Entries, first: [usize; 2]) -> [Self; 2];
     /// The stored texels from `index` on, and from `index` + 1 on: the left and the right ends of eight cells in a row. Zeros where
     /// not all nine are stored; from the first to the last texel of a map they are.
     fn texel_rows(texels: &StoredTexels, index: usize) -> [Self; 2];

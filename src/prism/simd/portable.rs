@@ -130,10 +130,15 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
     }
 
     #[inline(always)]
-    fn entries(entries: &Entries, index: [u32; LANES]) -> [Self; 2] {
-        let last = entries.count() - 1;
-        let pairs = index.map(|index| entries.get((index as usize).min(last)));
-        [pairs.map(|pair| pair.0), pairs.map(|pair| pair.1)].map(Self::from_array)
+    fn pairs(entries: &Entries, first: [usize; 2]) -> [Self; 2] {
+        let mut pairs = [[0.0; LANES]; 2];
+        for lane in 0..LANES {
+            let from = first[lane / 4];
+            if from.saturating_add(4) <= entries.count() {
+                (pairs[0][lane], pairs[1][lane]) = entries.get(from + lane % 4);
+            }
+        }
+        [Self::from_array(pairs[0]), Self::from_array(pairs[1])]
     }
 
     #[inline(always)]

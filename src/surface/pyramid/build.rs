@@ -6,7 +6,7 @@ use std::thread;
 
 use super::axis::Axis;
 use super::entries::{Entries, Pack};
-use super::{Level, reduce};
+use super::{Level, Order, reduce};
 
 /// Below so many entries a level is made on one thread.
 const PARALLEL: usize = (256 / reduce::WIDTH) * (256 / reduce::HEIGHT);
@@ -20,25 +20,33 @@ pub fn levels<T: Pack>(texels: &[T], axes: [Axis; 2]) -> Vec<Level> {
         last = last.map(Axis::coarser);
         shapes.push(last);
     }
-    let size = |[x, y]: &[Axis; 2]| x.blocks() * y.blocks();
-    let mut entries = Vec::with_capacity(shapes.iter().map(size).sum::<usize>() + Entries::TAIL);
-    entries.extend(finest(texels, axes));
-    let mut offsets = vec![0];
-    for (axes, finer) in shapes[1..].iter().zip(&shapes) {
+    let mut entries = Vec::new();
+    let mut places = Vec::new();
+    let mut rows = finest(texels, axes);
+    for (level, &[x, y]) in shapes.iter().enumerate() {
+        let (order, count) = Order::new(level, x.blocks(), y.blocks());
         let offset = entries.len();
-        let next = coarser::<T>(&entries[offset - size(finer)..], *finer);
-        debug_assert_eq!(next.len(), size(axes));
-        entries.extend(next);
-        offsets.push(offset);
+        places.push((offset, order));
+        entries.resize(offset + count, T::Packed::default());
+        let stored = &mut entries[offset..];
+        for (j, row) in rows.chunks_exact(x.blocks()).enumerate() {
+            for (i, &pair) in row.iter().enumerate() {
+                stored[order.index(i, j)] = pair;
+            }
+        }
+        if level + 1 < shapes.len() {
+            rows = coarser::<T>(&rows, [x, y]);
+        }
     }
     entries.resize(entries.len() + Entries::TAIL, T::Packed::default());
     let entries = Arc::new(T::entries(entries));
-    let levels = shapes.iter().zip(offsets);
-    let level = |([x, y], offset): (&[Axis; 2], usize)| Level {
+    let levels = shapes.iter().zip(places);
+    let level = |([x, y], (offset, order)): (&[Axis; 2], _)| Level {
         shift: [x.shift, y.shift],
         width: x.blocks(),
         height: y.blocks(),
         offset,
+        order,
         entries: entries.clone(),
     };
     levels.map(level).collect()
