@@ -106,9 +106,8 @@ impl Heights {
 
 /// What of a block does not depend on a ray.
 pub struct Middle {
-    /// Where it is, in texels from the record's corner, and half the cells of the block that are the triangle's.
+    /// Where it is, in texels from the record's corner.
     pub place: [f32; 2],
-    pub half: [f32; 2],
     /// From vertex 0.
     from: [f32; 2],
     /// N', in space.
@@ -180,7 +179,6 @@ impl Middle {
         let along_normals = 2.0 + far_s * n_s_sum + far_t * n_t_sum;
         Self {
             place,
-            half,
             from: [ds, dt],
             normal,
             spread,

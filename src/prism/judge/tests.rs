@@ -285,6 +285,8 @@ fn heights([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
 /// Of triangles of all kinds, folded ones and slivers too.
 #[test]
 fn points_of_the_curve_are_on_the_side_that_crossings_say() {
+    /// World units: what f64 leaves of places where the ray is edge-on.
+    const NEAR: f64 = 1e-5;
     let mut random = Random(2);
     let (mut hits, mut changes) = (0, 0);
     for _ in 0..600 {
@@ -299,8 +301,10 @@ fn points_of_the_curve_are_on_the_side_that_crossings_say() {
             let found = case.ask(&ray, |q| within::<Portable>(q, &Cells::ALL));
             if let Some(found) = &found {
                 hits += 1;
-                assert!(beside(&patch, &ray, found) < 1e-7, "{found:?} {ray:?}");
+                let off = beside(&patch, &ray, found);
+                assert!(off < NEAR, "{off} {found:?} {ray:?}");
             }
+            let near = NEAR / f64::from(ray.direction.length());
             let range = case.ask(&ray, |q| q.range);
             let mut before: Option<Seen> = None;
             for w in heights(range) {
@@ -310,13 +314,13 @@ fn points_of_the_curve_are_on_the_side_that_crossings_say() {
                     && now.is_inside()
                     && (before.above > 0.0) != (now.above > 0.0)
                 {
-                    let (near, far) = (before.t.min(now.t), before.t.max(now.t));
+                    let [first, last] = [before.t.min(now.t), before.t.max(now.t)];
                     // The curve may turn back between the two.
                     let is_plain = (now.b - before.b).abs().max_element() < 0.1;
-                    if is_plain && near > ray.tnear.into() && far < ray.tfar.into() {
+                    if is_plain && first > ray.tnear.into() && last < ray.tfar.into() {
                         changes += 1;
-                        let is_found = found.is_some_and(|found| found.t <= far + 1e-6);
-                        assert!(is_found, "{found:?} {near} {far} at {} of {ray:?}", now.w);
+                        let is_found = found.is_some_and(|found| found.t <= last + near);
+                        assert!(is_found, "{found:?} {first} {last} at {} of {ray:?}", now.w);
                     }
                 }
                 before = Some(now);

@@ -24,22 +24,22 @@ fn bits<L: Lanes>(lanes: L) -> [u32; LANES] {
 fn reads_pairs<L: Lanes>() {
     for map in maps() {
         let entries = map.pyramid().levels()[0].entries();
-        let count = entries.count() as u32;
-        let levels = map.pyramid().levels().iter();
-        let all: usize = levels.map(|level| level.width() * level.height()).sum();
-        assert_eq!(count as usize, all);
-        for first in 0..count + 3 {
-            let mut index: [u32; LANES] = std::array::from_fn(|l| first + 7 * l as u32);
-            index[3] = count - 1;
-            index[4] = count;
-            index[5] = i32::MAX as u32 + first;
-            index[6] = u32::MAX;
-            let [low, high] = L::entries(entries, index).map(bits);
-            for (l, index) in index.into_iter().enumerate() {
-                let (a, b) = entries.get(index.min(count - 1) as usize);
-                assert_eq!((low[l], high[l]), (a.to_bits(), b.to_bits()), "{index}");
+        let count = entries.count();
+        for first in 0..=count - 4 {
+            let index = [first, count - 4 - first];
+            let [low, high] = L::pairs(entries, index).map(bits);
+            for lane in 0..LANES {
+                let (a, b) = entries.get(index[lane / 4] + lane % 4);
+                assert_eq!(
+                    (low[lane], high[lane]),
+                    (a.to_bits(), b.to_bits()),
+                    "{index:?}"
+                );
             }
         }
+        // Well beyond what is kept after the last.
+        let none = L::pairs(entries, [count + 16, 2 * count + 16]);
+        assert_eq!(none.map(bits), [[0; LANES]; 2]);
     }
 }
 
