@@ -176,7 +176,9 @@ impl Middle {
             s,
             t,
         };
-        let (far_s, far_t) = (ds.abs() + FARTHEST, dt.abs() + FARTHEST);
+        // Where vertex 0 is, from the corner, is rounded as well.
+        let far_s = ds.abs() + first[0].abs() + FARTHEST;
+        let far_t = dt.abs() + first[1].abs() + FARTHEST;
         let along_normals = 2.0 + far_s * n_s_sum + far_t * n_t_sum;
         Self {
             place,
