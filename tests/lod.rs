@@ -1,4 +1,4 @@
-//! Level of detail: hits within half a footprint of the exact ones and no ray lost, and a minified map that does not alias.
+//! Level of detail: hits are the exact ones, and a minified map does not alias.
 #![cfg(any(feature = "embree", feature = "bvh"))]
 
 #[path = "../benches/common/mod.rs"]
@@ -58,72 +58,30 @@ fn tracers(world: &World) -> Vec<Box<dyn Tracer>> {
     ]
 }
 
-/// The first hit that no interval cuts off, for the law at both ends of one.
-fn is_at_an_end(ray: &Ray, t: f32, spread: f32) -> bool {
-    let off = |end: f32| (t - end).abs() <= 0.51 * spread * t + 1e-5 * t;
-    off(ray.tnear) || off(ray.tfar)
-}
-
+/// What level of detail changes is shading: hits are the exact march's to the bit, whatever the spread.
 #[test]
-fn hits_are_within_half_a_footprint_and_none_is_lost() {
+fn hits_are_exact_whatever_the_spread() {
     for (name, surface) in surfaces() {
         let exact = world(&prisms(&surface, Lod::Off), Placement::World);
         let exact = tracers(&exact).remove(0);
-        let cone = prisms(&surface, Lod::Cone);
-        let placed = world(&cone, Placement::World);
+        let placed = world(&prisms(&surface, Lod::Cone), Placement::World);
         let backends = tracers(&placed);
         let around = exact.bounds();
         for spread in SPREADS {
             placed.set_spread(spread);
             let mut numbers = Numbers::new(7);
-            let (mut hits, mut off, mut farthest) = (0, 0, 0.0f32);
+            let mut hits = 0;
             for _ in 0..RAYS {
                 let ray = ray(&mut numbers, &around);
-                let expected = exact.intersect(&ray);
-                let found = backends[0].intersect(&ray);
-                for other in &backends {
-                    assert_eq!(
-                        other.intersect(&ray).map(bits),
-                        found.map(bits),
-                        "{name} {spread}"
-                    );
-                    assert_eq!(
-                        other.occluded(&ray),
-                        found.is_some(),
-                        "{name} {spread} {ray:?}"
-                    );
+                let expected = exact.intersect(&ray).map(bits);
+                hits += usize::from(expected.is_some());
+                for backend in &backends {
+                    let found = backend.intersect(&ray).map(bits);
+                    assert_eq!(found, expected, "{name} {spread}: {ray:?}");
+                    let occluded = backend.occluded(&ray);
+                    assert_eq!(occluded, expected.is_some(), "{name} {spread}: {ray:?}");
                 }
-                let (Some(a), Some(b)) = (expected, found) else {
-                    let Some(one) = expected.or(found) else {
-                        continue;
-                    };
-                    let at_an_end = is_at_an_end(&ray, one.t, spread);
-                    assert!(at_an_end, "{name} {spread}: {ray:?} {expected:?} {found:?}");
-                    continue;
-                };
-                if is_at_an_end(&ray, a.t, spread) {
-                    continue;
-                }
-                hits += 1;
-                off += usize::from(a.t != b.t);
-                let part = (a.t - b.t).abs() / (0.5 * spread * a.t);
-                farthest = farthest.max(part);
-                let most = 0.5 * spread * a.t + 4.0 * f32::EPSILON * a.t;
-                assert!(
-                    (a.t - b.t).abs() <= most,
-                    "{name} {spread}: {ray:?} {a:?} {b:?}"
-                );
-                // On the side of the ray, though it is a mean.
-                assert!(b.ng.is_normalized(), "{name}: {b:?}");
-                assert_eq!(
-                    a.ng.dot(ray.direction) < 0.0,
-                    b.ng.dot(ray.direction) < 0.0,
-                    "{name}"
-                );
             }
-            println!(
-                "{name}, {spread}: {hits} hits, {off} not exact, at most {farthest:.3} of half a footprint"
-            );
             assert!(hits > RAYS / 20, "{name}");
         }
     }
