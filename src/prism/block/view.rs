@@ -45,6 +45,9 @@ const LONGEST: f64 = 1e12;
 /// Beyond this products would overflow.
 const LARGEST: f32 = 1e15;
 
+/// Below this products of the sides of texels would lose digits, or vanish.
+const SMALLEST: f32 = 1e-12;
+
 impl View {
     /// `None` where f32 will not do.
     #[inline(always)]
@@ -104,7 +107,8 @@ impl View {
         let x = u.mul_add(L::splat(cos), v * L::splat(sin)).to_array();
         let y = u.neg_mul_add(L::splat(sin), v * L::splat(cos)).to_array();
         let size = u0.abs() + v0.abs() + middle.size;
-        let is_sound = middle.is_tame() && size < LARGEST && time.abs() < 1e30;
+        let is_sound =
+            middle.is_tame() && size < LARGEST && middle.size > SMALLEST && time.abs() < 1e30;
         let view = Self {
             x: middle.axis(&x).from(u0 * cos + v0 * sin, 1.0),
             y: middle.axis(&y).from(v0 * cos - u0 * sin, 1.0),
@@ -148,7 +152,8 @@ fn before(t: f32, time: f64) -> f32 {
 /// The same, farther by what rounding a ray parameter moves it.
 #[inline(always)]
 fn after(t: f32, time: f64) -> f32 {
-    let from = f64::from(t) - time;
+    // From infinity what rounding moves would be no number.
+    let from = f64::from(t.max(f32::MIN)) - time;
     (from + 2.0 * f64::from(f32::EPSILON) * (from.abs() + time.abs())) as f32
 }
 
