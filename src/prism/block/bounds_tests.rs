@@ -13,7 +13,7 @@ use super::view::View;
 use super::*;
 use crate::prism::judge::Cells;
 use crate::prism::simd::{LANES, Lanes, Portable};
-use triangles::{Sight, leaves, leaves_of_large};
+use triangles::{Case, Kind, Sight, leaves, leaves_of_large, leaves_on};
 
 /// The largest of some ratios of what is found to what is allowed.
 struct Largest(f64, usize);
@@ -172,6 +172,8 @@ impl Vertices {
             ..
         } = sight;
         let map = case.surface.map();
+        let ends = [view.interval, view.inner];
+        assert!(!ends.as_flattened().iter().any(|end| end.is_nan()));
         let what = || format!("{:?} {:?}", case.kind, sight.block);
         for _ in 0..24 {
             let vertex = vertex(random);
@@ -230,6 +232,25 @@ fn vertices_of_large_triangles_are_where_f32_sees_them() {
     assert!(vertices.print() >= 50_000);
 }
 
+/// The judge decides where f32 has no digits left for products.
+#[test]
+fn what_is_tiny_is_not_for_f32() {
+    let mut random = Random(8);
+    for (size, is_seen) in [(1e-18, false), (1e-6, true)] {
+        let kind = Kind {
+            size,
+            texels: [90.0, 90.0],
+            lean: 0.1,
+            away: 0.0,
+            height: 0.05,
+        };
+        let case = Case::new(kind, &mut random).unwrap();
+        let mut seen = false;
+        leaves_on(&mut random, &case, 10, &mut |_, _| seen = true);
+        assert_eq!(seen, is_seen);
+    }
+}
+
 /// The interval of every part of a block, seen along a ray, holds S; so do boxes.
 #[test]
 fn parts_and_boxes_hold_the_surface() {
@@ -275,10 +296,14 @@ fn parts_and_boxes_hold_the_surface() {
                     assert!(off <= slack, "{:?} {block:?}: {off}", case.kind);
                     boxes += 1;
                     let point = eye.sees(point) - DVec3::new(0.0, 0.0, view.time);
-                    for axis in 0..3 {
-                        let [c, off] = intervals[axis];
-                        let found = (point[axis] - f64::from(c[lane])).abs();
-                        largest[axis].of(found, off[lane].into(), || format!("{:?}", case.kind));
+                    for ((at, [c, off]), largest) in point
+                        .to_array()
+                        .into_iter()
+                        .zip(&intervals)
+                        .zip(&mut largest)
+                    {
+                        let found = (at - f64::from(c[lane])).abs();
+                        largest.of(found, off[lane].into(), || format!("{:?}", case.kind));
                     }
                 }
             }

@@ -49,7 +49,7 @@ impl Kind {
         Self {
             texels: [long, long * random.of(&[1.0, 1.0, 0.1])],
             lean: random.of(&[0.0, 0.01, 0.1, 0.4, 1.0]),
-            size: random.of(&[1e-18, 1e-4, 1.0, 1e4]),
+            size: random.of(&[1e-4, 1.0, 1e4]),
             away: random.of(&[0.0, 1.0, 1e3]),
             height: random.of(&[0.001, 0.05, 0.5]),
         }
@@ -108,7 +108,7 @@ pub struct Case {
 }
 
 impl Case {
-    fn new(kind: Kind, random: &mut Random) -> Option<Self> {
+    pub fn new(kind: Kind, random: &mut Random) -> Option<Self> {
         let surface = kind.surface(random);
         let patch = surface.patch(0);
         let offsets = patch.offsets_of(surface.displacements(0));
@@ -338,12 +338,12 @@ pub fn leaves(
     for _ in 0..cases {
         let kind = Kind::any(&mut random);
         if let Some(case) = Case::new(kind, &mut random) {
-            leaves_of(&mut random, &case, per_case, &mut look);
+            leaves_on(&mut random, &case, per_case, &mut look);
         }
     }
 }
 
-/// The same of large triangles, about their corners.
+/// Leaves of large triangles, about their corners.
 pub fn leaves_of_large(
     seed: u32,
     cases: usize,
@@ -353,12 +353,13 @@ pub fn leaves_of_large(
     let mut random = Random(seed);
     for k in 0..cases {
         if let Some(case) = corners_of_large(&mut random, k) {
-            leaves_of(&mut random, &case, per_case, &mut look);
+            leaves_on(&mut random, &case, per_case, &mut look);
         }
     }
 }
 
-fn leaves_of(
+/// The same of one triangle.
+pub fn leaves_on(
     random: &mut Random,
     case: &Case,
     count: usize,

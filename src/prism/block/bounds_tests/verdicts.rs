@@ -49,7 +49,7 @@ impl Piece<'_> {
                 let inverse = -1.0 / s.perp_dot(t);
                 step = DVec2::new(miss.perp_dot(t), s.perp_dot(miss)) * inverse;
                 at += step.clamp_length_max(1.0);
-                if step.length() < 1e-12 || !(at.abs().max_element() < 4.0) {
+                if step.length() < 1e-12 || at.is_nan() || at.abs().max_element() > 4.0 {
                     break;
                 }
             }
