@@ -192,7 +192,8 @@ pub fn line(numbers: &mut Numbers) -> Ray {
     Ray::new(origin, (target - origin).normalize())
 }
 
-fn is_crossed_evenly(tracer: &dyn Tracer, line: &Ray, embedded: bool) -> bool {
+/// Whether a line keeps the law.
+pub fn is_crossed_evenly(tracer: &dyn Tracer, line: &Ray, embedded: bool) -> bool {
     /// No line crosses so often; a tracer that does not move on would.
     const MOST: usize = 1000;
     let mut rest = *line;

@@ -148,14 +148,9 @@ impl Middle {
             (x.abs() + y.abs() + z.abs()).to_array();
         let [.., n_s_length, n_t_length, _, _] = (x * x + y * y + z * z).sqrt().to_array();
         let first = record.first();
-        let mut place = [0.0; 2];
-        let mut half = [0.0; 2];
-        for axis in 0..2 {
-            let from = u32::from(block.place[axis]);
-            let to = (from + SIDE).min(record.end(axis)) as f32;
-            let from = from.max(BEFORE as u32) as f32;
-            (place[axis], half[axis]) = (0.5 * (from + to), 0.5 * (to - from).max(0.0));
-        }
+        let [[left, right], [bottom, top]] = [0, 1].map(|axis| extent(record, block, axis));
+        let place = [0.5 * (left + right), 0.5 * (bottom + top)];
+        let half = [0.5 * (right - left), 0.5 * (top - bottom)];
         let (ds, dt) = (place[0] - first[0], place[1] - first[1]);
         let [n, n_s, n_t] = [vector(record, 3), vector(record, 4), vector(record, 5)];
         let normal = Affine {
@@ -175,7 +170,9 @@ impl Middle {
             s,
             t,
         };
-        let (far_s, far_t) = (ds.abs() + FARTHEST, dt.abs() + FARTHEST);
+        // Where vertex 0 is, from the corner, is rounded as well.
+        let far_s = ds.abs() + first[0].abs() + FARTHEST;
+        let far_t = dt.abs() + first[1].abs() + FARTHEST;
         let along_normals = 2.0 + far_s * n_s_sum + far_t * n_t_sum;
         Self {
             place,
@@ -218,6 +215,15 @@ impl Middle {
             },
         }
     }
+}
+
+/// The part of a block that may be the triangle's, along an axis, in texels from the record's corner.
+#[inline(always)]
+pub fn extent(record: &Record, block: Block, axis: usize) -> [f32; 2] {
+    let from = u32::from(block.place[axis]);
+    let to = (from + SIDE).min(record.end(axis)) as f32;
+    let from = from.max(BEFORE as u32) as f32;
+    [from, to.max(from)]
 }
 
 /// A vector of a record, in space.

@@ -9,6 +9,8 @@
 //! Everything here is f32 and only ever *excludes* by bounds that are proven (docs/exact.md), or *accepts* what they leave no doubt of. A hit that is
 //! accepted is found by Newton's method in f64 on S itself ([`newton`]); what is neither is decided in f64 by the [judge](super::judge).
 
+#[cfg(test)]
+mod bounds_tests;
 mod cell;
 mod cull;
 mod cut;

@@ -12,20 +12,20 @@ use crate::surface::{
 };
 
 /// Numbers in [0, 1).
-struct Random(u32);
+pub(super) struct Random(pub u32);
 
 impl Random {
-    fn next(&mut self) -> f32 {
+    pub fn next(&mut self) -> f32 {
         self.0 = self.0.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
         let x = self.0 ^ (self.0 >> 16);
         (x.wrapping_mul(0x9e37_79b9) >> 8) as f32 / (1 << 24) as f32
     }
 
-    fn signed(&mut self) -> f32 {
+    pub fn signed(&mut self) -> f32 {
         2.0 * self.next() - 1.0
     }
 
-    fn vector(&mut self) -> Vec3 {
+    pub fn vector(&mut self) -> Vec3 {
         Vec3::new(self.signed(), self.signed(), self.signed())
     }
 }

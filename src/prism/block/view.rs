@@ -47,6 +47,9 @@ const LONGEST: f64 = 1e12;
 /// Beyond this products would overflow.
 const LARGEST: f32 = 1e15;
 
+/// Below this products of the sides of texels would lose digits, or vanish.
+const SMALLEST: f32 = 1e-12;
+
 impl View {
     /// Of use where [`is_sound`](Self::is_sound).
     #[inline(always)]
@@ -117,7 +120,10 @@ impl View {
             time,
             interval,
             inner,
-            is_sound: middle.is_tame() && size < LARGEST && time.abs() < 1e30,
+            is_sound: middle.is_tame()
+                && size < LARGEST
+                && middle.size > SMALLEST
+                && time.abs() < 1e30,
             is_usual,
             middle,
         }
@@ -149,7 +155,8 @@ fn before(t: f32, time: f64) -> f32 {
 /// The same, farther by what rounding a ray parameter moves it.
 #[inline(always)]
 fn after(t: f32, time: f64) -> f32 {
-    let from = f64::from(t) - time;
+    // From infinity what rounding moves would be no number.
+    let from = f64::from(t.max(f32::MIN)) - time;
     (from + 2.0 * f64::from(f32::EPSILON) * (from.abs() + time.abs())) as f32
 }
 
