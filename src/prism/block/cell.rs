@@ -8,8 +8,10 @@
 //! - Where the origin is on the inner side of all four sides of the outline, farther than `off`, the outline of S goes around it once, as
 //!   that of the patch does: they can be moved into each other without passing it. So S has a root in the cell. Where the Jacobian of S has one sign in
 //!   all of the cell, every root counts the same, and there is exactly one.
+//! - Where the Jacobian has one sign in a square, S meets no point twice there: the difference of a bilinear patch at two points is its derivative
+//!   half way, applied to the step; that of S is a matrix as near to it as derivatives are, and not singular.
 
-use glam::Vec4;
+use glam::{DVec2, Vec2, Vec4};
 
 use super::leaf::Leaf;
 use super::middle::Heights;
@@ -21,10 +23,47 @@ pub enum Verdict {
     Missed,
     /// Hit exactly once: about where, from the cell's lower left corner, and whether that is certainly within the ray's interval and the triangle.
     Hit {
-        at: [f32; 2],
+        at: Once,
         is_inside: bool,
     },
+    /// S has one root at most in the part and around it, about there: Newton's method tells.
+    Once(Once),
+    /// To be looked at in quarters: the Jacobian changes its sign.
+    Folded(Seen),
     Unknown,
+}
+
+/// A part of a cell with room around it, in which S has one root at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Once {
+    /// About where the root is, from the cell's lower left corner.
+    pub at: [f32; 2],
+    /// The part's own lower left corner, and its side.
+    pub corner: [f32; 2],
+    pub side: f32,
+}
+
+impl Once {
+    /// What is around a part, as a part of its side.
+    pub const ROOM: f32 = 0.25;
+
+    /// Whether a place in the cell is in the part or around it.
+    #[inline(always)]
+    pub fn holds(&self, place: DVec2) -> bool {
+        let part = (place - Vec2::from(self.corner).as_dvec2()) / f64::from(self.side);
+        let room = f64::from(Self::ROOM);
+        part.min_element() >= -room && part.max_element() <= 1.0 + room
+    }
+}
+
+/// A cell, or a part of one, as the ray sees it: corners in the order of the outline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    pub x: Vec4,
+    pub y: Vec4,
+    /// How far S is from the bilinear patch of the corners at most, and how far its derivatives, for the whole cell.
+    pub off: f32,
+    pub bend: f32,
 }
 
 /// Corners of a cell in the order of its outline: (0,0) (1,0) (1,1) (0,1).
@@ -71,41 +110,125 @@ pub fn judged(
         return Verdict::Missed;
     }
 
-    let off = leaf.off + 0.5 * view.shear * beta;
-    let (x, y) = (along(&view.x), along(&view.y));
-    // Twice the areas that the sides span with the origin, and what they may be off by.
-    let (x1, y1) = (turned(x), turned(y));
-    let (ex, ey) = (x1 - x, y1 - y);
-    let (left, right) = (x * y1, y * x1);
-    let sides = left - right;
-    let doubt = off * (ex.abs() + ey.abs()) + ROUNDED * (left.abs() + right.abs());
-    let positive = (doubt - sides).is_negative_bitmask();
-    let negative = (doubt + sides).is_negative_bitmask();
-    if positive != ALL && negative != ALL {
-        let diagonals = Diagonals::new(x, y, off);
-        return if is_outside(positive, negative, &diagonals) {
-            Verdict::Missed
+    let seen = Seen {
+        x: along(&view.x),
+        y: along(&view.y),
+        off: leaf.off + 0.5 * view.shear * beta,
+        bend: 4.0 * view.shear * beta + 2.0 * leaf.off,
+    };
+    match seen.roots() {
+        Roots::None => Verdict::Missed,
+        Roots::One => {
+            let least = b0.min(b1).min(b2).min_element();
+            Verdict::Hit {
+                at: seen.once([0.0; 2], 1.0),
+                is_inside: least > SLACK && near > view.inner[0] && far < view.inner[1],
+            }
+        }
+        Roots::OneAtMost => Verdict::Once(seen.once([0.0; 2], 1.0)),
+        Roots::Unknown => Verdict::Folded(seen),
+    }
+}
+
+/// The roots of S in a cell or a part of one.
+#[derive(Clone, Copy, PartialEq)]
+enum Roots {
+    None,
+    One,
+    /// Also around it, by [`Once::ROOM`].
+    OneAtMost,
+    Unknown,
+}
+
+impl Seen {
+    #[inline(always)]
+    fn roots(&self) -> Roots {
+        let Self { x, y, off, bend } = *self;
+        // Twice the areas that the sides span with the origin, and what they may be off by.
+        let (x1, y1) = (turned(x), turned(y));
+        let (ex, ey) = (x1 - x, y1 - y);
+        let (left, right) = (x * y1, y * x1);
+        let sides = left - right;
+        let doubt = off * (ex.abs() + ey.abs()) + ROUNDED * (left.abs() + right.abs());
+        let positive = (doubt - sides).is_negative_bitmask();
+        let negative = (doubt + sides).is_negative_bitmask();
+        let goes_around = positive == ALL || negative == ALL;
+        if !goes_around && is_outside(positive, negative, &Diagonals::new(x, y, off)) {
+            return Roots::None;
+        }
+
+        // The Jacobian of the patch is affine: one sign at its corners is one everywhere.
+        let (bx, by) = (turned_back(ex), turned_back(ey));
+        let (left, right) = (bx * ey, by * ex);
+        let jacobian = left - right;
+        let lengths = ex.abs() + ey.abs() + bx.abs() + by.abs();
+        let doubt = bend * (lengths + bend) + ROUNDED * (left.abs() + right.abs());
+        if goes_around {
+            let jacobian = if positive == ALL { jacobian } else { -jacobian };
+            if (doubt - jacobian).is_negative_bitmask() == ALL {
+                return Roots::One;
+            }
+        }
+        // Where the square is larger by a quarter on each side: S's derivatives differ by less than eight times as much there.
+        let sum = turned(jacobian) + turned_back(jacobian);
+        let around = (1.0 + 2.0 * Once::ROOM) * jacobian - Once::ROOM * sum;
+        let doubt = Vec4::splat(8.0 * doubt.max_element());
+        let has_one_sign = (doubt - around).is_negative_bitmask() == ALL
+            || (doubt + around).is_negative_bitmask() == ALL;
+        if has_one_sign {
+            Roots::OneAtMost
         } else {
-            Verdict::Unknown
-        };
+            Roots::Unknown
+        }
     }
 
-    // The Jacobian of the patch is affine: one sign at its corners is one everywhere. S's derivatives differ from the patch's by no more than 4 beta.
-    let (bx, by) = (ex.wxyz_before(), ey.wxyz_before());
-    let (left, right) = (bx * ey, by * ex);
-    let jacobian = left - right;
-    let bend = 4.0 * view.shear * beta + 2.0 * leaf.off;
-    let lengths = ex.abs() + ey.abs() + bx.abs() + by.abs();
-    let doubt = bend * (lengths + bend) + ROUNDED * (left.abs() + right.abs());
-    let jacobian = if positive == ALL { jacobian } else { -jacobian };
-    if (doubt - jacobian).is_negative_bitmask() != ALL {
-        return Verdict::Unknown;
+    fn once(&self, corner: [f32; 2], side: f32) -> Once {
+        let [p, q] = self.root();
+        Once {
+            at: [corner[0] + side * p, corner[1] + side * q],
+            corner,
+            side,
+        }
     }
-    let least = b0.min(b1).min(b2).min_element();
-    Verdict::Hit {
-        at: root(x.to_array(), y.to_array()),
-        is_inside: least > SLACK && near > view.inner[0] && far < view.inner[1],
+
+    /// What f32 tells of a cell by its quarters, each of which is a bilinear patch of its own.
+    pub fn in_quarters(&self) -> Verdict {
+        let mut found = Verdict::Missed;
+        for quarter in 0..4 {
+            let corner = [S[quarter] * 0.5, T[quarter] * 0.5];
+            let part = Self {
+                x: quarter_of(self.x, quarter),
+                y: quarter_of(self.y, quarter),
+                ..*self
+            };
+            match (part.roots(), found) {
+                (Roots::None, _) => {}
+                (Roots::One | Roots::OneAtMost, Verdict::Missed) => {
+                    found = Verdict::Once(part.once(corner, 0.5));
+                }
+                _ => return Verdict::Unknown,
+            }
+        }
+        found
     }
+
+    /// The root of the bilinear patch nearest to the middle, about.
+    #[inline(always)]
+    fn root(&self) -> [f32; 2] {
+        root(self.x.to_array(), self.y.to_array())
+    }
+}
+
+/// The corners of a quarter: that at a corner of the outline, which is its own corner of the same number.
+#[inline(always)]
+fn quarter_of(v: Vec4, quarter: usize) -> Vec4 {
+    let middle = 0.25 * (v.x + v.y + v.z + v.w);
+    let (next, last) = (0.5 * (v + turned(v)), 0.5 * (v + turned_back(v)));
+    let mut part = [middle; 4];
+    part[quarter] = v[quarter];
+    part[(quarter + 1) % 4] = next[quarter];
+    part[(quarter + 3) % 4] = last[quarter];
+    Vec4::from_array(part)
 }
 
 /// What rounding leaves of a difference of products, as a part of them.
@@ -120,16 +243,10 @@ fn turned(v: Vec4) -> Vec4 {
     Vec4::new(v.y, v.z, v.w, v.x)
 }
 
-/// Lane k becomes lane k - 1.
-trait Before {
-    fn wxyz_before(self) -> Self;
-}
-
-impl Before for Vec4 {
-    #[inline(always)]
-    fn wxyz_before(self) -> Self {
-        Self::new(self.w, self.x, self.y, self.z)
-    }
+/// The last corner's.
+#[inline(always)]
+fn turned_back(v: Vec4) -> Vec4 {
+    Vec4::new(v.w, v.x, v.y, v.z)
 }
 
 /// On which side of the diagonals the origin certainly is: bit 0 for that from corner 0 to 2, bit 1 for that from 1 to 3.
@@ -200,5 +317,6 @@ fn root([ax, bx, dx, cx]: [f32; 4], [ay, by, dy, cy]: [f32; 4]) -> [f32; 2] {
     } else {
         -ky / hy
     };
-    [p.clamp(0.0, 1.0), q.clamp(0.0, 1.0)]
+    // Not far beyond, where Newton's method may begin anyhow.
+    [p.clamp(-0.5, 1.5), q.clamp(-0.5, 1.5)]
 }

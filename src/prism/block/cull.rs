@@ -34,7 +34,7 @@ impl<L: Lanes> Offsets<L> {
         let k_off = L::splat(k_off + k.reach(parts.half));
         let k = k.lanes(parts.s, parts.t);
         let w = middle * k;
-        let reach = around.mul_add(k, most * k_off);
+        let reach = around.mul_add(k.abs(), most * k_off);
         Self {
             w,
             reach,

@@ -27,7 +27,7 @@ const MOST_TEXELS: f64 = 60000.0;
 const FEWEST_TEXELS: f64 = 3.0;
 
 /// The least height of a triangle of texels, as a part of its longest side: digits that f32 barycentrics may lose.
-const THINNEST: f64 = 1e-4;
+const THINNEST: f64 = 1e-3;
 
 /// How much a normal may turn from a block's middle to its corners, as a part of its length: the series for 1/|N'| is one in this.
 const MOST_TURN: f64 = 0.4;

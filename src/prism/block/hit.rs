@@ -4,11 +4,11 @@ mod explain;
 
 use glam::{DVec2, DVec3};
 
-use super::cell::{Verdict, judged};
+use super::cell::{Once, Verdict, judged};
 use super::cull::met;
 use super::leaf::{Leaf, Rows};
 use super::middle::Heights;
-use super::newton::{Cell, land};
+use super::newton::{Cell, Whose, in_triangle, land};
 use super::place::{PART, PARTS, Place, leaf_of, leaves_of};
 use super::view::View;
 use super::{Block, LEAF, Record};
@@ -273,6 +273,27 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Takes the one root near a place, if it is in the cell and in the triangle; whether that is beyond doubt.
+    #[inline(always)]
+    fn lands(&mut self, cell: [i64; 2], stored: [f32; 4], at: &Once) -> bool {
+        let patch = self.patch();
+        let per_unit = 1.0 / f64::from(patch.map.unit());
+        let cell = Cell {
+            corner: DVec2::new(cell[0] as f64, cell[1] as f64),
+            heights: stored.map(|h| f64::from(h) * per_unit),
+        };
+        let Some(crossing) = land(&patch, self.frame, &cell, at) else {
+            return false;
+        };
+        let Found { u, v, .. } = crossing.at;
+        let (whose, of) = (cell.find(patch.texel(u, v)), in_triangle(u, v));
+        if whose == Whose::Ours && of == Whose::Ours {
+            self.take(crossing);
+            return true;
+        }
+        whose == Whose::Others || of == Whose::Others
+    }
+
     #[inline(always)]
     fn take(&mut self, crossing: Crossing) {
         let t = crossing.at.t as f32;
@@ -297,25 +318,17 @@ impl<L: Lanes> Task<L> for Look<'_, '_> {
     #[inline(always)]
     fn run(self) {
         let Self { search, cell, .. } = self;
-        if let Verdict::Hit { at, .. } = self.verdict {
-            let patch = search.patch();
-            let per_unit = 1.0 / f64::from(patch.map.unit());
-            let cell = Cell {
-                corner: DVec2::new(cell[0] as f64, cell[1] as f64),
-                heights: self.stored.map(|h| f64::from(h) * per_unit),
-            };
-            if let Some(found) = land(&patch, search.frame, &cell, at) {
-                // Roundings of f64 are a millionth of this.
-                const NEAR: f64 = 1e-9;
-                let Found { u, v, .. } = found.at;
-                let least = u.min(v).min(1.0 - u - v);
-                if least > NEAR {
-                    search.take(found);
-                }
-                if least.abs() > NEAR {
-                    return;
-                }
-            }
+        let verdict = match self.verdict {
+            Verdict::Folded(seen) => seen.in_quarters(),
+            verdict => verdict,
+        };
+        let is_settled = match verdict {
+            Verdict::Missed => true,
+            Verdict::Hit { at, .. } | Verdict::Once(at) => search.lands(cell, self.stored, &at),
+            Verdict::Folded(_) | Verdict::Unknown => false,
+        };
+        if is_settled {
+            return;
         }
         let one = |k: usize| [cell[k]; 2];
         search.decide::<L>(Cells {

@@ -5,8 +5,9 @@
 //! moment. On the way only the two lateral coordinates are looked at ([`Seen`]); where no step is left worth taking, S in
 //! space confirms it, and gives depth and normal.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec2};
 
+use super::cell::Once;
 use super::hit::Crossing;
 use crate::prism::judge::Found;
 use crate::prism::ray_frame::RayFrame;
@@ -34,27 +35,56 @@ impl Cell {
         }
     }
 
-    /// Whether a texel coordinate is in the cell, or a hair beyond.
+    /// Where a place is.
     #[inline(always)]
-    fn holds(&self, texel: DVec2) -> bool {
-        const HAIR: f64 = 1e-9;
+    pub fn find(&self, texel: DVec2) -> Whose {
         let f = texel - self.corner;
-        f.min_element() >= -HAIR && f.max_element() <= 1.0 + HAIR
+        Whose::by(f.min_element().min(1.0 - f.max_element()))
+    }
+}
+
+/// Whether barycentric coordinates are in the triangle.
+#[inline(always)]
+pub fn in_triangle(u: f64, v: f64) -> Whose {
+    Whose::by(u.min(v).min(1.0 - u - v))
+}
+
+/// Whose a place is: of this cell, of this triangle, or of another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Whose {
+    Ours,
+    Others,
+    Doubtful,
+}
+
+impl Whose {
+    /// By how far inside it is, texels or barycentrics.
+    #[inline(always)]
+    fn by(inside: f64) -> Self {
+        // Roundings of f64 are a millionth of this.
+        const HAIR: f64 = 1e-9;
+        if inside > HAIR {
+            Self::Ours
+        } else if inside < -HAIR {
+            Self::Others
+        } else {
+            Self::Doubtful
+        }
     }
 }
 
 /// Steps of Newton's method before the last.
 const MOST_STEPS: usize = 5;
 
-/// The hit in a cell near a place in it, with its normal; `None` where Newton's method does not end there.
+/// The root of S, with the cell's heights, in a part of it or around it, with its normal; `None` where Newton's method does not end there.
 #[inline(always)]
-pub fn land(patch: &Patch<'_>, frame: &RayFrame, cell: &Cell, at: [f32; 2]) -> Option<Crossing> {
+pub fn land(patch: &Patch<'_>, frame: &RayFrame, cell: &Cell, once: &Once) -> Option<Crossing> {
     // Barycentrics, and texels: where the normal is taken.
     const FINE: f64 = 1e-11;
     const FINE_TEXELS: f64 = 1e-10;
     let [p0, p1, p2] = patch.texels;
     let (a, b) = (p1 - p0, p2 - p0);
-    let from = cell.corner + DVec2::new(at[0].into(), at[1].into()) - p0;
+    let from = cell.corner + Vec2::from(once.at).as_dvec2() - p0;
     let per_area = 1.0 / a.perp_dot(b);
     let mut uv = [from.perp_dot(b) * per_area, a.perp_dot(from) * per_area];
     let fine = FINE.min(FINE_TEXELS / (a.abs() + b.abs()).max_element());
@@ -69,7 +99,9 @@ pub fn land(patch: &Patch<'_>, frame: &RayFrame, cell: &Cell, at: [f32; 2]) -> O
         let ratio = step / last;
         let left = step * (4.0 * ratio * ratio).min(1.0);
         if left <= fine {
-            return confirmed(patch, frame, cell, uv, fine);
+            let crossing = confirmed(patch, frame, cell, uv, fine)?;
+            let place = patch.texel(crossing.at.u, crossing.at.v) - cell.corner;
+            return once.holds(place).then_some(crossing);
         }
         last = step;
     }
@@ -101,7 +133,7 @@ fn confirmed(
     );
     let (u, v) = (u + step_u, v + step_v);
     let is_there = step_u.abs().max(step_v.abs()) <= BEYOND * fine;
-    (is_there && cell.holds(patch.texel(u, v))).then_some(Crossing {
+    is_there.then_some(Crossing {
         at: Found {
             t: (depth + step_u * du[z] + step_v * dv[z]) * frame.per_depth,
             u,

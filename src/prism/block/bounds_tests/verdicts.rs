@@ -70,6 +70,8 @@ struct Verdicts {
     missed: usize,
     hit: usize,
     inside: usize,
+    folded: usize,
+    once: usize,
     unknown: usize,
     /// Of cells missed or not looked at: with a root outside the triangle or the interval.
     beside: usize,
@@ -93,6 +95,13 @@ impl Verdicts {
             let t = piece.eye.sees(truth.raised(piece.cell + at, height)).z as f32;
             (u.min(v).min(1.0 - u - v), t)
         };
+        let verdict = match verdict {
+            Some(Verdict::Folded(seen)) => {
+                self.folded += 1;
+                Some(seen.in_quarters())
+            }
+            verdict => verdict,
+        };
         match verdict {
             None | Some(Verdict::Missed) => {
                 for &at in &roots {
@@ -114,7 +123,16 @@ impl Verdicts {
                 self.hit += 1;
                 self.inside += usize::from(is_inside);
             }
-            Some(Verdict::Unknown) => self.unknown += 1,
+            Some(Verdict::Once(once)) => {
+                assert!(roots.len() <= 1, "{once:?} {roots:?}: {}", what());
+                assert!(
+                    roots.iter().all(|&at| once.holds(at)),
+                    "{once:?} {roots:?}: {}",
+                    what()
+                );
+                self.once += 1;
+            }
+            Some(Verdict::Unknown | Verdict::Folded(_)) => self.unknown += 1,
         }
     }
 }

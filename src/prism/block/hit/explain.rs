@@ -135,7 +135,7 @@ fn seen<L: Lanes>(
             fate: match verdict {
                 Verdict::Missed => CellFate::Missed,
                 Verdict::Hit { .. } => CellFate::Hit,
-                Verdict::Unknown => CellFate::Judged,
+                Verdict::Once(_) | Verdict::Folded(_) | Verdict::Unknown => CellFate::Judged,
             },
         });
     }
