@@ -77,7 +77,7 @@ impl EmbreeTracer {
     /// built from, and all its objects over `map` follow. Something is built only where bounds have grown, also by
     /// edits that another tracer of the same prisms has been told of.
     ///
-    /// What has grown is put into a small scene of its own, which rays are asked after the large one: 64 x 64 texels are there in about a
+    /// What has grown is put into a small scene of its own, which is asked before the large one: 64 x 64 texels are there in about a
     /// millisecond, however large the world. [`Self::settle`] makes one of the two again; where a quarter of the world has
     /// grown, this does so.
     ///
@@ -233,37 +233,42 @@ fn attach_instances(
     Ok(())
 }
 
-/// The nearer of a hit and what a ray meets in another scene.
-fn nearer(hit: Option<Hit>, scene: &Scene, ray: &Ray) -> Option<Hit> {
-    let tfar = hit.map_or(ray.tfar, |hit| hit.t);
-    scene.intersect1(&Ray { tfar, ..*ray }).or(hit)
+/// The ray up to a hit.
+fn until(hit: &Hit, ray: &Ray) -> Ray {
+    Ray {
+        tfar: hit.t,
+        ..*ray
+    }
 }
 
+// The small scene is asked first: through the gaps of the large one a ray would go on to what is far behind.
 impl Tracer for EmbreeTracer {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let hit = self.scene.intersect1(ray);
-        match &self.grown {
-            Some(grown) => nearer(hit, grown, ray),
-            None => hit,
+        match self.grown.as_ref().and_then(|grown| grown.intersect1(ray)) {
+            Some(hit) => Some(self.scene.intersect1(&until(&hit, ray)).unwrap_or(hit)),
+            None => self.scene.intersect1(ray),
         }
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        self.scene.occluded1(ray)
-            || self
-                .grown
-                .as_ref()
-                .is_some_and(|grown| grown.occluded1(ray))
+        self.grown
+            .as_ref()
+            .is_some_and(|grown| grown.occluded1(ray))
+            || self.scene.occluded1(ray)
     }
 
     fn intersect8(&self, rays: &RayPacket) -> [Option<Hit>; RayPacket::LANES] {
-        let mut hits = self.scene.intersect8(rays, COHERENCE);
-        if let Some(grown) = &self.grown {
-            for (lane, hit) in hits.iter_mut().enumerate() {
-                *hit = nearer(*hit, grown, &rays.ray(lane));
+        let Some(grown) = &self.grown else {
+            return self.scene.intersect8(rays, COHERENCE);
+        };
+        let (first, mut shorter) = (grown.intersect8(rays, COHERENCE), rays.clone());
+        for (lane, hit) in first.iter().enumerate() {
+            if let Some(hit) = hit {
+                shorter.set(lane, &until(hit, &rays.ray(lane)));
             }
         }
-        hits
+        let hits = self.scene.intersect8(&shorter, COHERENCE);
+        std::array::from_fn(|lane| hits[lane].or(first[lane]))
     }
 
     fn occluded8(&self, rays: &RayPacket) -> u8 {
