@@ -8,41 +8,55 @@ mod common;
 use std::sync::Arc;
 
 use common::scene::{RANGE, random, rock_map, sphere};
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Vec2, Vec3};
 use prismarch::bvh::BvhTracer;
 use prismarch::prism::{EditBounds, March, PrismOptions, Prisms};
 use prismarch::ray::Ray;
 use prismarch::surface::{
-    DisplacedSurface, Displacement, DisplacementMap, TexelRect, Texels, UvTransform,
+    DisplacedSurface, Displacement, DisplacementMap, Seams, TexelRect, Texels, UvTransform, Wrap,
 };
 use prismarch::trace::{Edited, Hit, Object, Placement, Shape, Tracer, World};
 
 const MAP: usize = 64;
 
-/// A sphere in world space and two instances of another over the same map, and a third over a map that is never edited.
+/// A sphere in world space and two instances of another over the same map (more than once, and beyond its edges), a third over a map
+/// that is never edited, one of few large triangles with closed seams, and one of triangles of less than a few texels.
 struct Stage {
     map: Arc<DisplacementMap>,
     still: Arc<DisplacementMap>,
 }
 
 impl Stage {
-    fn new() -> Self {
+    fn new(wrap: Wrap) -> Self {
+        let rock = |seed| {
+            let map = rock_map(MAP, seed);
+            let all = TexelRect {
+                x: 0,
+                y: 0,
+                width: MAP,
+                height: MAP,
+            };
+            let texels = map.read(all).unwrap();
+            Arc::new(DisplacementMap::new(MAP, MAP, texels, wrap).unwrap())
+        };
         Self {
-            map: rock_map(MAP, 7),
-            still: rock_map(MAP, 8),
+            map: rock(7),
+            still: rock(8),
         }
     }
 
     fn world(&self, edit_bounds: EditBounds) -> World {
-        let shape = |subdivisions, map: &Arc<DisplacementMap>, repeats: f32| {
+        let shape = |subdivisions, map: &Arc<DisplacementMap>, repeats: f32, seams| {
             let displacement = Displacement {
                 uv: UvTransform {
-                    scale: glam::Vec2::new(repeats, 1.0),
+                    scale: Vec2::new(repeats, 1.0),
+                    offset: Vec2::new(0.3, 0.4) * (repeats - 1.0),
                     ..UvTransform::default()
                 },
                 ..Displacement::new(RANGE)
             };
-            let surface = DisplacedSurface::new(sphere(subdivisions), map.clone(), displacement);
+            let surface = DisplacedSurface::new(sphere(subdivisions), map.clone(), displacement)
+                .map(|surface| surface.with_seams(seams));
             let options = PrismOptions {
                 march: March::Exact,
                 edit_bounds,
@@ -57,15 +71,24 @@ impl Stage {
             mask: u32::MAX,
         };
         let at = |x: f32| Affine3A::from_translation(Vec3::X * x);
+        let up = |z: f32| Affine3A::from_translation(Vec3::Z * z);
         World::new(vec![
-            object(shape(2, &self.map, 1.0), Placement::World),
+            object(shape(2, &self.map, 1.0, Seams::Open), Placement::World),
             object(
-                shape(1, &self.map, 2.0),
+                shape(1, &self.map, 2.0, Seams::Open),
                 Placement::Instances(vec![at(3.0), at(-3.0)]),
             ),
             object(
-                shape(1, &self.still, 1.0),
+                shape(1, &self.still, 1.0, Seams::Open),
                 Placement::Instances(vec![at(6.0)]),
+            ),
+            object(
+                shape(0, &self.map, 1.7, Seams::Closed),
+                Placement::Instances(vec![at(-6.0)]),
+            ),
+            object(
+                shape(3, &self.map, 0.5, Seams::Closed),
+                Placement::Instances(vec![up(3.0)]),
             ),
         ])
     }
@@ -97,18 +120,22 @@ fn rays(seed: u32) -> impl Iterator<Item = Ray> {
     (0..3000).map(move |i| {
         let number = |k: u32| 2.0 * random(seed ^ (i * 8 + k)) - 1.0;
         let origin = Vec3::new(8.0 * number(0), 5.0 * number(1), 5.0 * number(2));
-        let target = Vec3::new(7.0 * number(3), number(4), number(5));
+        let target = match i % 5 {
+            0 => Vec3::new(number(3), number(4), 3.0 + number(5)),
+            _ => Vec3::new(7.0 * number(3), number(4), number(5)),
+        };
         Ray::new(origin, target - origin)
     })
 }
 
 /// What a tracer of either backend must do; `told` takes an edit over.
 fn law<T: Tracer>(
+    wrap: Wrap,
     edit_bounds: EditBounds,
     build: impl Fn(&World) -> T,
     told: impl Fn(&mut T, &World, &Arc<DisplacementMap>, TexelRect) -> Edited,
 ) {
-    let stage = Stage::new();
+    let stage = Stage::new(wrap);
     let world = stage.world(edit_bounds);
     let mut tracer = build(&world);
     let mut commits = 0;
@@ -206,8 +233,9 @@ fn assert_same(tracer: &impl Tracer, new: &impl Tracer, seed: u32) {
 
 #[test]
 fn edits_under_obvhs_are_as_good_as_a_new_tracer() {
-    for edit_bounds in [EditBounds::Tight, EditBounds::Range] {
+    for (wrap, edit_bounds) in CASES {
         law(
+            wrap,
             edit_bounds,
             |world| BvhTracer::new(world).unwrap(),
             |tracer, world, map, rect| tracer.map_edited(world, map, rect).unwrap(),
@@ -215,32 +243,92 @@ fn edits_under_obvhs_are_as_good_as_a_new_tracer() {
     }
 }
 
+const CASES: [(Wrap, EditBounds); 4] = [
+    (Wrap::Repeat, EditBounds::Tight),
+    (Wrap::Repeat, EditBounds::Range),
+    (Wrap::Clamp, EditBounds::Tight),
+    (Wrap::Mirror, EditBounds::Tight),
+];
+
 #[cfg(feature = "embree")]
 mod embree {
     use super::*;
-    use prismarch::embree::{EmbreeOptions, EmbreeTracer};
+    use prismarch::embree::{
+        Device, DeviceOptions, EmbreeOptions, EmbreeTracer, SceneBuilder, SceneOptions,
+        UserGeometry,
+    };
+    use prismarch::prism::MovingPrisms;
+    use prismarch::surface::{MovingSurface, TimeStep};
 
     #[test]
     fn edits_under_embree_are_as_good_as_a_new_tracer() {
-        for editable in [false, true] {
-            let options = EmbreeOptions {
-                editable,
-                ..EmbreeOptions::default()
-            };
-            for edit_bounds in [EditBounds::Tight, EditBounds::Range] {
-                law(
-                    edit_bounds,
-                    |world| EmbreeTracer::new(world, &options).unwrap(),
-                    |tracer, world, map, rect| tracer.map_edited(world, map, rect).unwrap(),
-                );
-            }
+        for (wrap, edit_bounds) in CASES {
+            law(
+                wrap,
+                edit_bounds,
+                |world| EmbreeTracer::new(world, &EmbreeOptions::default()).unwrap(),
+                |tracer, world, map, rect| tracer.map_edited(world, map, rect).unwrap(),
+            );
         }
+    }
+
+    /// A moving object's boxes are its triangles' ranges at every time step: those that an edit widens are told to Embree.
+    #[test]
+    fn edits_of_a_moving_object_are_as_good_as_a_new_scene() {
+        let stage = Stage::new(Wrap::Repeat);
+        let surface =
+            DisplacedSurface::new(sphere(1), stage.map.clone(), Displacement::new(RANGE)).unwrap();
+        let mesh = surface.mesh().clone();
+        let moved = TimeStep {
+            positions: mesh
+                .positions()
+                .iter()
+                .map(|p| 1.5 * *p + Vec3::X)
+                .collect(),
+            normals: mesh.normals().to_vec(),
+        };
+        let moving = Arc::new(MovingSurface::new(Arc::new(surface), vec![moved]).unwrap());
+        let device = Device::new(&DeviceOptions::default()).unwrap();
+        let build = || {
+            let prisms = Arc::new(MovingPrisms::new(moving.clone(), March::Exact).unwrap());
+            let mut builder = SceneBuilder::new(&device, SceneOptions::default()).unwrap();
+            builder
+                .attach(UserGeometry::new(&device, prisms.clone()).unwrap())
+                .unwrap();
+            (prisms, builder.commit().unwrap())
+        };
+        let (prisms, mut scene) = build();
+        let mut commits = 0;
+        for number in 0..8 {
+            let rect = stage.edit(number, [0, u16::MAX]);
+            if prisms.map_edited(rect).any() {
+                let mut builder = scene.reopen();
+                builder.changed(0).unwrap();
+                scene = builder.commit().unwrap();
+                commits += 1;
+            }
+            let (_, new) = build();
+            let (mut hits, mut grazes) = (0, 0);
+            for (i, ray) in (0u32..).zip(rays(number)) {
+                let ray = Ray {
+                    time: random(i),
+                    ..ray
+                };
+                match (scene.intersect1(&ray), new.intersect1(&ray)) {
+                    (None, None) => {}
+                    (Some(a), Some(b)) if (a.t - b.t).abs() <= 2e-6 * b.t => hits += 1,
+                    _ => grazes += 1,
+                }
+            }
+            assert!(hits > 100 && grazes <= 1, "{hits} {grazes}");
+        }
+        assert!(commits > 0);
     }
 
     /// The first to be told makes the bounds grow; the second must not take that for nothing new.
     #[test]
     fn two_tracers_of_the_same_prisms_both_follow() {
-        let stage = Stage::new();
+        let stage = Stage::new(Wrap::Repeat);
         let world = stage.world(EditBounds::Tight);
         let mut embree = EmbreeTracer::new(&world, &EmbreeOptions::default()).unwrap();
         let mut bvh = BvhTracer::new(&world).unwrap();

@@ -35,6 +35,16 @@ impl Times {
         self.0.push(thread_seconds() - start);
     }
 
+    /// Takes over what another has timed.
+    pub fn time_of(&mut self, other: &Self) {
+        self.0.extend(&other.0);
+    }
+
+    /// The longest, seconds; 0 without any.
+    pub fn most(&self) -> f64 {
+        self.0.iter().copied().fold(0.0, f64::max)
+    }
+
     /// The middle of all rounds, seconds; NaN without any.
     pub fn median(&self) -> f64 {
         let mut sorted = self.0.clone();

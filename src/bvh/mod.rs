@@ -142,7 +142,7 @@ impl BvhTracer {
     }
 
     /// Brings the tracer up to date after an edit of a map in place ([`DisplacementMap::update`]): `world` is the one it was
-    /// built from, and all its objects over `map` follow. Trees are refitted only where bounds have grown, also by edits that
+    /// built from, and all its objects over `map` follow. Trees are refitted only where bounds have grown, and in them only what is above those, also by edits that
     /// another tracer of the same prisms has been told of.
     ///
     /// # Errors

@@ -16,33 +16,61 @@ const MARGIN: f64 = 1e-12;
 /// Largest byte on the grid.
 const LAST: f64 = 255.0;
 
-/// Recomputes every node's boxes, bottom-up, from `boxes[primitive]`; returns the box over everything.
-///
-/// The tree's shape stays, so after large changes it is correct but slower than a new one.
-pub(super) fn refit(bvh: &mut CwBvh, boxes: &[Aabb]) -> Aabb {
-    let mut node_boxes = vec![Aabb::EMPTY; bvh.nodes.len()];
-    // A child is stored after its parent, so that backwards is bottom-up.
-    for index in (0..bvh.nodes.len()).rev() {
-        let node = &mut bvh.nodes[index];
-        let mut children = [Aabb::EMPTY; 8];
-        for (slot, child) in children.iter_mut().enumerate() {
-            if node.is_child_empty(slot) {
-                continue;
-            }
-            *child = if node.is_leaf(slot) {
-                let (first, count) = node.child_primitives(slot);
-                bvh.primitive_indices[first as usize..(first + count) as usize]
-                    .iter()
-                    .fold(Aabb::EMPTY, |b, &prim| b.union(boxes[prim as usize]))
-            } else {
-                node_boxes[node.child_node_index(slot) as usize]
-            };
-        }
-        let total = children.into_iter().fold(Aabb::EMPTY, Aabb::union);
-        quantise(node, &children, total);
-        node_boxes[index] = total;
+/// Boxes of what a tree is over, and of its nodes.
+#[derive(Default)]
+pub(super) struct Boxes {
+    primitives: Vec<Aabb>,
+    nodes: Vec<Aabb>,
+}
+
+impl Boxes {
+    /// The box over everything.
+    pub(super) fn all(&self) -> Aabb {
+        self.nodes.first().copied().unwrap_or(Aabb::EMPTY)
     }
-    node_boxes.first().copied().unwrap_or(Aabb::EMPTY)
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.primitives[..]) + size_of_val(&self.nodes[..])
+    }
+
+    /// Takes new boxes, of as many primitives as before, or the first ones: recomputes the boxes, bottom-up, of every node that has
+    /// another one below it.
+    ///
+    /// The tree's shape stays, so after large changes it is correct but slower than a new one.
+    pub(super) fn refit(&mut self, bvh: &mut CwBvh, boxes: &[Aabb]) {
+        let is_new = |prim: usize| self.primitives.get(prim) != Some(&boxes[prim]);
+        self.nodes.resize(bvh.nodes.len(), Aabb::EMPTY);
+        let mut changed = vec![false; bvh.nodes.len()];
+        // A child is stored after its parent, so that backwards is bottom-up.
+        for index in (0..bvh.nodes.len()).rev() {
+            let node = &mut bvh.nodes[index];
+            let mut children = [Aabb::EMPTY; 8];
+            for (slot, child) in children.iter_mut().enumerate() {
+                if node.is_child_empty(slot) {
+                    continue;
+                }
+                if node.is_leaf(slot) {
+                    let (first, count) = node.child_primitives(slot);
+                    for &prim in &bvh.primitive_indices[first as usize..(first + count) as usize] {
+                        changed[index] |= is_new(prim as usize);
+                        *child = child.union(boxes[prim as usize]);
+                    }
+                } else {
+                    let below = node.child_node_index(slot) as usize;
+                    changed[index] |= changed[below];
+                    *child = self.nodes[below];
+                }
+            }
+            if changed[index] {
+                let total = children.into_iter().fold(Aabb::EMPTY, Aabb::union);
+                quantise(node, &children, total);
+                self.nodes[index] = total;
+            }
+        }
+        self.primitives.clear();
+        self.primitives.extend_from_slice(boxes);
+    }
 }
 
 /// Writes the boxes of a node's children; those of empty slots are ignored. `total` encloses them all.

@@ -10,7 +10,7 @@ use obvhs::ploc::PlocBuilder;
 use obvhs::{BvhBuildParams, aabb::Aabb as ObvhsAabb};
 
 use super::BvhError;
-use super::quantise::refit;
+use super::quantise::Boxes;
 use super::slabs::NodeRay;
 use crate::ray::{Aabb, Ray};
 
@@ -20,7 +20,7 @@ const MAX_DEPTH: u32 = 31;
 /// A tree over numbered boxes.
 pub(super) struct Tree {
     bvh: CwBvh,
-    bounds: Aabb,
+    boxes: Boxes,
 }
 
 impl Tree {
@@ -61,23 +61,28 @@ impl Tree {
                 max: MAX_DEPTH,
             });
         }
-        let bounds = refit(&mut bvh, boxes);
-        Ok(Self { bvh, bounds })
+        let mut tree = Self {
+            bvh,
+            boxes: Boxes::default(),
+        };
+        tree.refit(boxes);
+        Ok(tree)
     }
 
     /// Takes the same number of new boxes, and keeps the tree's shape.
     pub(super) fn refit(&mut self, boxes: &[Aabb]) {
-        self.bounds = refit(&mut self.bvh, boxes);
+        self.boxes.refit(&mut self.bvh, boxes);
     }
 
     /// The box over everything.
     pub(super) fn bounds(&self) -> Aabb {
-        self.bounds
+        self.boxes.all()
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&self.bvh.nodes[..]) + size_of_val(&self.bvh.primitive_indices[..])
+        let tree = size_of_val(&self.bvh.nodes[..]) + size_of_val(&self.bvh.primitive_indices[..]);
+        tree + self.boxes.bytes()
     }
 
     /// Visits the boxes that `ray` meets, roughly front to back. `visit` answers with the parameter

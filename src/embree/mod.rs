@@ -22,6 +22,7 @@ mod grids;
 mod instance;
 #[cfg(feature = "embree4-sys")]
 mod interop;
+mod part;
 mod prisms;
 pub mod raw;
 mod scene;

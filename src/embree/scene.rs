@@ -114,6 +114,11 @@ impl SceneBuilder {
         })
     }
 
+    /// An empty scene of the same device and options.
+    pub(super) fn another(&self) -> Result<Self, EmbreeError> {
+        Self::new(&self.device, self.options)
+    }
+
     /// Adds a geometry; ids count up from 0.
     pub fn attach(&mut self, geometry: impl Into<Geometry>) -> Result<u32, EmbreeError> {
         let mut geometry = geometry.into();
@@ -314,15 +319,6 @@ impl Scene {
     /// The same scene, to be changed and committed again.
     pub fn reopen(self) -> SceneBuilder {
         self.0
-    }
-
-    /// Changes the scene where it is and commits it. After an error it must not be traced.
-    pub(super) fn change(
-        &mut self,
-        change: impl FnOnce(&mut SceneBuilder) -> Result<(), EmbreeError>,
-    ) -> Result<(), EmbreeError> {
-        change(&mut self.0)?;
-        self.0.commit_in_place()
     }
 
     /// The device.

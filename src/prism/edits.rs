@@ -2,7 +2,9 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::touch::Touch;
+use super::exact::{ExactPrisms, Primitive};
+use super::touch::{Touch, around};
+use super::uniform::UniformPrisms;
 use super::{Parts, Prisms};
 use crate::surface::{DisplacedSurface, DisplacementMap, TexelKind, TexelRect};
 
@@ -73,94 +75,129 @@ impl BoundsChange {
     }
 }
 
+/// What an edit has made grow.
+#[derive(Default)]
+pub(super) struct Growth {
+    pub change: BoundsChange,
+    /// Base triangles whose range of w has grown, ascending.
+    pub widened: Vec<u32>,
+}
+
 impl Prisms {
     /// Takes note of an edit of the map's texels in `rect` ([`DisplacementMap::update`]); before the next ray, or that
     /// may miss what has grown. Prisms that do not hold the new heights are widened in place; those that do stay as they
     /// are, even if less would do by now.
     ///
-    /// May run while rays are in flight and beside other edits, as `update` may.
+    /// May run while rays are in flight and beside other edits, as `update` may. It takes time for what the rectangle touches, and
+    /// very little for the rest of the mesh.
     pub fn map_edited(&self, rect: TexelRect) -> BoundsChange {
-        let mut change = BoundsChange::default();
+        self.grow(rect).change
+    }
+
+    /// [`Self::map_edited`], and more of what it found.
+    pub(super) fn grow(&self, rect: TexelRect) -> Growth {
         let map = self.surface.map();
         let (low, high) = map.range();
-        if self
-            .room
-            .is_some_and(|room| room.0 <= low && high <= room.1)
-        {
-            return change;
+        let has_room = |room: (f32, f32)| room.0 <= low && high <= room.1;
+        if self.room.is_some_and(has_room) {
+            return Growth::default();
         }
         // What is not in the map was never edited.
         let Ok(edited) = map.range_in(rect) else {
-            return change;
+            return Growth::default();
         };
         let touch = Touch::new(map, rect);
-        match &self.parts {
+        let growth = match &self.parts {
             Parts::Exact(exact) => {
                 exact.take_heights(&self.surface, self.room);
-                let triangles = self.surface.mesh().triangles().len() as u32;
-                for triangle in 0..triangles {
-                    let corners = around(self.surface.corner_texcoords(triangle));
-                    // Walls look at the map elsewhere too.
-                    let has_walls = !self.surface.walls_of(triangle).is_empty();
-                    if touch.misses(corners) && !has_walls || !self.surface.overlaps(triangle, rect)
-                    {
-                        continue;
-                    }
-                    change.touched += 1;
-                    let patch = self.surface.patch(triangle);
-                    let record = exact.record(triangle);
-                    // There is room for all other texels: these alone decide, if all of them fit.
-                    let edited = patch.offsets_of(patch.displacements(edited));
-                    if !holds(record.offsets(), edited) {
-                        record.widen(self.edit_bounds.offsets(&self.surface, triangle));
-                    }
-                    for primitive in exact.primitives_of(triangle) {
-                        if exact.widen(&self.surface, self.room, primitive) {
-                            change.primitives.push(primitive);
-                        }
-                    }
-                }
-                change.primitives.sort_unstable();
+                self.grow_exact(exact, &touch, rect, edited)
             }
-            Parts::Uniform(uniform) => {
-                for (prim, record) in (0u32..).zip(&uniform.records) {
-                    if touch.misses(around(self.surface.corner_texcoords(prim))) {
-                        continue;
-                    }
-                    let patch = self.surface.patch(prim);
-                    if map.overlaps(patch.texels, rect) {
-                        change.touched += 1;
-                        if !record.holds(patch.displacements(edited))
-                            && record.widen(self.edit_bounds.range(&self.surface, prim))
-                        {
-                            change.primitives.push(prim);
-                        }
-                    }
-                }
-            }
-        }
-        if change.any() {
+            Parts::Uniform(uniform) => self.grow_uniform(uniform, &touch, rect, edited),
+        };
+        if growth.change.any() {
             self.growths.fetch_add(1, Ordering::Release);
         }
-        change
+        growth
+    }
+
+    fn grow_exact(
+        &self,
+        exact: &ExactPrisms,
+        touch: &Touch,
+        rect: TexelRect,
+        edited: (f32, f32),
+    ) -> Growth {
+        let surface = &self.surface;
+        let candidates = exact.touched_by(surface, touch);
+        let mut triangles: Vec<u32> = candidates
+            .iter()
+            .map(|&primitive| exact.primitive(primitive).triangle())
+            .collect();
+        triangles.sort_unstable();
+        triangles.dedup();
+        triangles.retain(|&triangle| surface.overlaps(triangle, rect));
+        let widens = |triangle: u32| {
+            let (patch, record) = (surface.patch(triangle), exact.record(triangle));
+            // There is room for all other texels: these alone decide, if all of them fit.
+            let edited = patch.offsets_of(patch.displacements(edited));
+            !holds(record.offsets(), edited)
+                && record.widen(self.edit_bounds.offsets(surface, triangle))
+        };
+        let widened: Vec<u32> = triangles.iter().copied().filter(|&t| widens(t)).collect();
+        // A block has its own texels' heights; the other primitives have their triangle's.
+        let blocks = candidates.into_iter().filter(|&primitive| {
+            matches!(exact.primitive(primitive), Primitive::Block(block)
+                if triangles.binary_search(&block.triangle).is_ok())
+        });
+        let others = widened
+            .iter()
+            .flat_map(|&triangle| exact.others_of(triangle));
+        let mut primitives: Vec<u32> = blocks
+            .chain(others)
+            .filter(|&primitive| exact.widen(surface, self.room, primitive))
+            .collect();
+        primitives.sort_unstable();
+        Growth {
+            change: BoundsChange {
+                touched: triangles.len(),
+                primitives,
+            },
+            widened,
+        }
+    }
+
+    fn grow_uniform(
+        &self,
+        uniform: &UniformPrisms,
+        touch: &Touch,
+        rect: TexelRect,
+        edited: (f32, f32),
+    ) -> Growth {
+        let (surface, map) = (&self.surface, self.surface.map());
+        let mut change = BoundsChange::default();
+        for prim in uniform.index.candidates(touch) {
+            let patch = surface.patch(prim);
+            if touch.misses(&around(patch.texels)) || !map.overlaps(patch.texels, rect) {
+                continue;
+            }
+            change.touched += 1;
+            let record = &uniform.records[prim as usize];
+            if !record.holds(patch.displacements(edited))
+                && record.widen(self.edit_bounds.range(surface, prim))
+            {
+                change.primitives.push(prim);
+            }
+        }
+        Growth {
+            widened: change.primitives.clone(),
+            change,
+        }
     }
 
     /// How often edits have made bounds grow: a tree made when the number was the same still holds the surface.
     pub fn growths(&self) -> u64 {
         self.growths.load(Ordering::Acquire)
     }
-}
-
-/// The box around the corners of one triangle; NaN where a coordinate is.
-pub(super) fn around(st: [glam::Vec2; 3]) -> [[f32; 2]; 2] {
-    [0, 1].map(|axis| {
-        let [a, b, c] = st.map(|st| st[axis]);
-        if (a + b + c).is_finite() {
-            [a.min(b).min(c), a.max(b).max(c)]
-        } else {
-            [f32::NAN; 2]
-        }
-    })
 }
 
 /// Whether a range holds another.

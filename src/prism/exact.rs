@@ -3,16 +3,18 @@
 //! Primitives are, in this order: blocks of texels; base triangles that have none ([`Whole`]), each at once; and the walls of base triangles where seams are
 //! closed.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::block::{Ask, Block, Crossing, Cutter, Heights, Record, nearest, outline};
+use super::block::{Ask, Block, Crossing, Cutter, Heights, LEAF, Record, nearest, outline};
 use super::edits::EditBounds;
 use super::judge::{Cells, Found, Question, walls, within};
 use super::march::polish::Root;
 use super::ray_frame::{RayFrame, axes};
 use super::simd::{Lanes, Task};
+use super::touch::{NOWHERE, Touch, TouchIndex, around, union};
 use super::{MarchError, Parts, PrismHit, Prisms};
 use crate::ray::{Aabb, Ray};
 use crate::surface::{Corners, DisplacedSurface, DisplacementMap, Patch, TexelBox};
@@ -32,6 +34,8 @@ pub struct ExactPrisms {
     /// What texels mean, when the prisms were made; and bits of the largest |D| since.
     heights: Heights,
     most: AtomicU32,
+    /// Where primitives read the map.
+    pub index: TouchIndex,
 }
 
 /// What a primitive is.
@@ -108,6 +112,7 @@ impl ExactPrisms {
             boxes: Vec::new(),
             heights: Heights::new(surface),
             most: AtomicU32::new(0),
+            index: TouchIndex::new(0, |_| NOWHERE),
         };
         made.take_heights(surface, room);
         for triangle in 0..count {
@@ -143,6 +148,7 @@ impl ExactPrisms {
             let bounds = made.bounds_now(surface, room, primitive as u32);
             made.boxes.push(StoredBox::new(bounds));
         }
+        made.index = TouchIndex::new(made.len(), |primitive| made.reads(surface, primitive));
         Ok(made)
     }
 
@@ -175,6 +181,7 @@ impl ExactPrisms {
             + size_of_val(&self.wholes[..])
             + size_of_val(&self.walled[..])
             + size_of_val(&self.boxes[..])
+            + self.index.bytes()
     }
 
     /// # Panics
@@ -200,10 +207,7 @@ impl ExactPrisms {
         let texels = match primitive {
             Primitive::Block(block) => block.texels(map, self.record(triangle)),
             Primitive::Whole(_) => TexelBox::EVERYWHERE,
-            Primitive::Walls(_) => TexelBox {
-                low: DVec2::INFINITY,
-                high: DVec2::NEG_INFINITY,
-            },
+            Primitive::Walls(_) => NOWHERE,
         };
         (triangle, texels)
     }
@@ -242,24 +246,58 @@ impl ExactPrisms {
         bounds.is_valid() && self.boxes[index as usize].widen(bounds)
     }
 
-    /// The primitives of a base triangle.
-    pub fn primitives_of(&self, triangle: u32) -> impl Iterator<Item = u32> {
+    /// Where a primitive reads the map, in texel coordinates; of walls, where they do beyond their triangle.
+    fn reads(&self, surface: &DisplacedSurface, index: u32) -> TexelBox {
+        match self.primitive(index) {
+            Primitive::Block(block) => {
+                let leaf = DVec2::from(LEAF.map(f64::from));
+                let TexelBox { low, high } =
+                    block.texels(surface.map(), self.record(block.triangle));
+                TexelBox {
+                    low,
+                    // Leaves are whole.
+                    high: low + ((high - low) / leaf).ceil() * leaf,
+                }
+            }
+            Primitive::Whole(triangle) => around(surface.patch(triangle).texels),
+            Primitive::Walls(triangle) => {
+                let others = surface.walls_of(triangle).iter();
+                let others = others.filter_map(|wall| surface.other_texels(wall));
+                others.fold(NOWHERE, |all, edge| union(&all, &around(edge)))
+            }
+        }
+    }
+
+    /// The primitives that may read a rectangle of texels, ascending; walls, where they may beyond their triangle.
+    pub fn touched_by(&self, surface: &DisplacedSurface, touch: &Touch) -> Vec<u32> {
+        let candidates = self.index.candidates(touch);
+        let touched = candidates.filter(|&index| !touch.misses(&self.reads(surface, index)));
+        touched.collect()
+    }
+
+    /// The blocks of a base triangle.
+    fn blocks_of(&self, triangle: u32) -> Range<u32> {
         let first = self
             .blocks
             .partition_point(|block| block.triangle < triangle);
-        let blocks = self.blocks[first..].iter();
-        let count = blocks
-            .take_while(|block| block.triangle == triangle)
-            .count();
-        let others = |all: &[u32], before: usize| {
+        let after = self.blocks[first..].partition_point(|block| block.triangle == triangle);
+        first as u32..(first + after) as u32
+    }
+
+    /// The primitives of a base triangle that are no blocks.
+    pub fn others_of(&self, triangle: u32) -> impl Iterator<Item = u32> + use<> {
+        let within = |all: &[u32], before: usize| {
             let found = all.binary_search(&triangle);
             found.ok().map(|index| (before + index) as u32)
         };
-        let whole = others(&self.wholes, self.blocks.len());
-        let walls = others(&self.walled, self.blocks.len() + self.wholes.len());
-        (first as u32..(first + count) as u32)
-            .chain(whole)
-            .chain(walls)
+        let whole = within(&self.wholes, self.blocks.len());
+        let walls = within(&self.walled, self.blocks.len() + self.wholes.len());
+        whole.into_iter().chain(walls)
+    }
+
+    /// The primitives of a base triangle.
+    pub fn primitives_of(&self, triangle: u32) -> impl Iterator<Item = u32> + use<> {
+        self.blocks_of(triangle).chain(self.others_of(triangle))
     }
 }
 

@@ -238,7 +238,7 @@ impl Prisms {
     pub fn bytes(&self) -> usize {
         let prisms = match &self.parts {
             Parts::Exact(exact) => exact.bytes(),
-            Parts::Uniform(uniform) => size_of_val(&uniform.records[..]),
+            Parts::Uniform(uniform) => size_of_val(&uniform.records[..]) + uniform.index.bytes(),
         };
         let charts = self.charts.as_ref().map_or(0, ChartEdges::bytes);
         prisms + size_of_val(self.surface.walls()) + charts
@@ -311,6 +311,14 @@ impl Prisms {
         match &self.parts {
             Parts::Exact(exact) => exact.part(self.surface.map(), primitive),
             Parts::Uniform(_) => (primitive, TexelBox::EVERYWHERE),
+        }
+    }
+
+    /// The primitives of a base triangle.
+    fn primitives_of(&self, triangle: u32) -> Vec<u32> {
+        match &self.parts {
+            Parts::Exact(exact) => exact.primitives_of(triangle).collect(),
+            Parts::Uniform(_) => vec![triangle],
         }
     }
 

@@ -8,6 +8,7 @@
 
 use std::sync::Arc;
 
+use super::edits::Growth;
 use super::{BoundsChange, Lod, March, MarchError, PrismHit, PrismOptions, Prisms};
 use crate::ray::{Aabb, Ray};
 use crate::surface::{ClosestPoint, Corners, MovingSurface, PointQuery, TexelBox, TexelRect};
@@ -97,9 +98,22 @@ impl MovingPrisms {
         self.prisms.is_empty()
     }
 
-    /// [`Prisms::map_edited`].
+    /// [`Prisms::map_edited`], of [`Self::bounds`].
     pub fn map_edited(&self, rect: TexelRect) -> BoundsChange {
-        self.prisms.map_edited(rect)
+        let Growth { change, widened } = self.prisms.grow(rect);
+        if self.time_steps() == 1 {
+            return change;
+        }
+        // These boxes are made of a triangle's whole range.
+        let primitives = widened
+            .into_iter()
+            .flat_map(|t| self.prisms.primitives_of(t));
+        let mut primitives: Vec<u32> = primitives.collect();
+        primitives.sort_unstable();
+        BoundsChange {
+            primitives,
+            ..change
+        }
     }
 
     /// The box of one traced primitive at a time step. Between two steps the surface is in the linear interpolation of their boxes.

@@ -1,25 +1,26 @@
-//! Which triangles can have texels of a rectangle under them: a few comparisons instead of
-//! [`DisplacementMap::overlaps`], for most of a large mesh.
+//! What can read a rectangle of texels: a few comparisons instead of [`DisplacementMap::overlaps`], and no look at all at most of
+//! a large mesh.
 
-use crate::surface::{DisplacementMap, TexelRect, Wrap};
+use std::ops::Range;
 
-/// Where in texture space samples read a rectangle of texels.
+use glam::DVec2;
+
+use crate::surface::{DisplacementMap, TexelBox, TexelRect, Wrap};
+
+/// Where in texel coordinates samples read a rectangle of texels.
 pub struct Touch {
     /// Across and up.
     axes: [Along; 2],
 }
 
-/// The same along one axis: intervals of texture coordinates, again in every period.
+/// The same along one axis: intervals of texel coordinates, again in every period.
 struct Along {
-    intervals: [[f32; 2]; 2],
-    period: f32,
+    intervals: [[f64; 2]; 2],
+    period: f64,
 }
 
 /// Texels from a texel within which samples read it, with slack.
 const REACH: f64 = 1.25;
-
-/// Rounding of coordinates, relative to their size.
-const ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 impl Touch {
     pub fn new(map: &DisplacementMap, rect: TexelRect) -> Self {
@@ -32,40 +33,41 @@ impl Touch {
         }
     }
 
-    /// Whether no sample within a box of texture coordinates ([low, high] across and up) can read the rectangle. Never for a
-    /// box of NaNs.
+    /// Whether no sample within a box can read the rectangle.
     #[inline]
-    pub fn misses(&self, [across, up]: [[f32; 2]; 2]) -> bool {
-        self.axes[0].misses(across) || self.axes[1].misses(up)
+    pub fn misses(&self, TexelBox { low, high }: &TexelBox) -> bool {
+        self.axes[0].misses(low.x, high.x) || self.axes[1].misses(low.y, high.y)
     }
 }
 
 impl Along {
     /// Texels `first..first + count` of a side of `n`.
     fn new(wrap: Wrap, first: usize, count: usize, n: usize) -> Self {
-        // Centre i is at (i + 0.5) / n.
-        let place = |texel: f64| ((texel + 0.5) / n as f64) as f32;
-        let low = place(first as f64 - REACH);
-        let high = place((first + count) as f64 - 1.0 + REACH);
-        /// Further than any coordinate, and no infinity, which would make NaNs.
-        const EVER: f32 = 1e30;
+        let low = first as f64 - REACH;
+        let high = (first + count) as f64 - 1.0 + REACH;
+        let side = n as f64;
         match wrap {
             Wrap::Repeat => Self {
                 intervals: [[low, high]; 2],
-                period: 1.0,
+                period: side,
             },
             // Backwards in every second map.
-            Wrap::Mirror => Self {
-                intervals: [[low, high], [2.0 - high, 2.0 - low]],
-                period: 2.0,
-            },
+            Wrap::Mirror => {
+                let last = 2.0 * side - 1.0;
+                Self {
+                    intervals: [[low, high], [last - high, last - low]],
+                    period: 2.0 * side,
+                }
+            }
             // Edge texels go on for ever.
             Wrap::Clamp => {
+                /// Further than any coordinate, and no infinity, which would make NaNs.
+                const EVER: f64 = 1e300;
                 let low = if first == 0 { -EVER } else { low };
                 let high = if first + count == n { EVER } else { high };
                 Self {
                     intervals: [[low, high]; 2],
-                    period: f32::MAX,
+                    period: f64::MAX,
                 }
             }
         }
@@ -73,9 +75,17 @@ impl Along {
 
     /// Whether no period's interval meets `low..=high`: the last one that does not begin beyond `high` ends before `low`.
     #[inline]
-    fn misses(&self, [low, high]: [f32; 2]) -> bool {
-        let margin = ROUNDING * (low.abs() + high.abs() + 1.0);
-        let (low, high) = (low - margin, high + margin);
+    fn misses(&self, low: f64, high: f64) -> bool {
+        /// Rounding of coordinates, relative to their size.
+        const ROUNDING: f64 = 16.0 * f64::EPSILON;
+        let margin = |x: f64| {
+            if x.is_finite() {
+                ROUNDING * x.abs()
+            } else {
+                0.0
+            }
+        };
+        let (low, high) = (low - margin(low), high + margin(high));
         self.intervals.iter().all(|&[from, to]| {
             let last = ((high - from) / self.period).floor() * self.period;
             to + last < low
@@ -83,11 +93,86 @@ impl Along {
     }
 }
 
+/// The box around a triangle of texel coordinates; everywhere where one is no number.
+pub fn around([a, b, c]: [DVec2; 3]) -> TexelBox {
+    if (a + b + c).is_finite() {
+        TexelBox {
+            low: a.min(b).min(c),
+            high: a.max(b).max(c),
+        }
+    } else {
+        TexelBox::EVERYWHERE
+    }
+}
+
+/// Holds no texel.
+pub const NOWHERE: TexelBox = TexelBox {
+    low: DVec2::INFINITY,
+    high: DVec2::NEG_INFINITY,
+};
+
+/// The box around two.
+pub fn union(a: &TexelBox, b: &TexelBox) -> TexelBox {
+    TexelBox {
+        low: a.low.min(b.low),
+        high: a.high.max(b.high),
+    }
+}
+
+/// Boxes over groups of what reads the map, in the order of its numbers, and over groups of these: neighbours read nearby texels.
+pub struct TouchIndex {
+    /// What is numbered.
+    count: usize,
+    groups: Vec<TexelBox>,
+    groups_of_groups: Vec<TexelBox>,
+}
+
+/// Members of a group.
+const GROUP: usize = 64;
+
+impl TouchIndex {
+    /// Of `count` things, of which `reads` tells where they read the map.
+    pub fn new(count: usize, reads: impl Fn(u32) -> TexelBox) -> Self {
+        let groups: Vec<TexelBox> = (0..count.div_ceil(GROUP))
+            .map(|group| {
+                members(group, count).fold(NOWHERE, |all, index| union(&all, &reads(index as u32)))
+            })
+            .collect();
+        let over = |groups: &[TexelBox]| groups.iter().fold(NOWHERE, |all, one| union(&all, one));
+        let groups_of_groups = groups.chunks(GROUP).map(over).collect();
+        Self {
+            count,
+            groups,
+            groups_of_groups,
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.groups[..]) + size_of_val(&self.groups_of_groups[..])
+    }
+
+    /// What may read a rectangle, ascending: all of every group that may.
+    pub fn candidates(&self, touch: &Touch) -> impl Iterator<Item = u32> {
+        let tops = self.groups_of_groups.iter().enumerate();
+        let tops = tops.filter(|(_, top)| !touch.misses(top));
+        tops.flat_map(|(top, _)| members(top, self.groups.len()))
+            .filter(|&group| !touch.misses(&self.groups[group]))
+            .flat_map(|group| members(group, self.count))
+            .map(|index| index as u32)
+    }
+}
+
+/// The members of a group, of `count` in all.
+fn members(group: usize, count: usize) -> Range<usize> {
+    GROUP * group..(GROUP * (group + 1)).min(count)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::surface::Texels;
-    use glam::{DVec2, Vec2};
+    use glam::Vec2;
 
     /// What is left out must not overlap, and little else may stay.
     #[test]
@@ -116,22 +201,79 @@ mod tests {
                 let centre = reach * (Vec2::new(random(), random()) - 0.5);
                 let corners =
                     [(); 3].map(|()| centre + 0.2 * (Vec2::new(random(), random()) - 0.5));
-                let overlaps = map.overlaps(corners.map(|st| map.to_texel(st.as_dvec2())), rect);
-                let misses = Touch::new(&map, rect).misses(super::super::edits::around(corners));
+                let texels = corners.map(|st| map.to_texel(st.as_dvec2()));
+                let overlaps = map.overlaps(texels, rect);
+                let misses = Touch::new(&map, rect).misses(&around(texels));
                 assert!(!(overlaps && misses), "{wrap:?} {rect} {corners:?}");
                 kept += u32::from(!misses);
                 touched += u32::from(overlaps);
             }
             assert!(kept < 2 * touched, "{wrap:?}: {kept} for {touched}");
-            let nowhere = [[f32::NAN; 2]; 2];
             let rect = TexelRect {
                 x: 3,
                 y: 4,
                 width: 1,
                 height: 1,
             };
-            assert!(!Touch::new(&map, rect).misses(nowhere));
+            let touch = Touch::new(&map, rect);
+            assert!(!touch.misses(&around([DVec2::NAN; 3])));
+            assert!(touch.misses(&NOWHERE));
             assert!(map.overlaps([DVec2::NAN; 3], rect));
+        }
+    }
+
+    /// Texel by texel: what a box of whole cells reads is found, and what is two texels off is not.
+    #[test]
+    fn whole_cells_are_found_through_every_wrap() {
+        let n = 13;
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            for first in 0..n {
+                for count in 1..=n - first {
+                    let along = Along::new(wrap, first, count, n);
+                    let reads = |low: i64, high: i64| {
+                        let mut texels = (low..=high).map(|i| wrap.texel(i, n));
+                        texels.any(|i| (first..first + count).contains(&i))
+                    };
+                    for low in -40i64..40 {
+                        for cells in [1, 5] {
+                            let high = low + cells;
+                            let misses = along.misses(low as f64, high as f64);
+                            assert!(!(misses && reads(low, high)), "{wrap:?} {low}");
+                            assert!(misses || reads(low - 2, high + 2), "{wrap:?} {low}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_index_leaves_out_only_what_does_not_touch() {
+        let map = DisplacementMap::new(1000, 1000, Texels::U8(vec![0; 1_000_000]), Wrap::Repeat);
+        let map = map.unwrap();
+        for count in [0, 1, 63, 64, 65, 4096, 10_000] {
+            // Rows of a hundred.
+            let reads = |index: u32| {
+                let low = 10.0 * DVec2::new(f64::from(index % 100), f64::from(index / 100));
+                TexelBox {
+                    low,
+                    high: low + 10.0,
+                }
+            };
+            let index = TouchIndex::new(count, reads);
+            for (x, y) in [(0, 0), (505, 3), (990, 990), (333, 777)] {
+                let rect = TexelRect {
+                    x,
+                    y,
+                    width: 10,
+                    height: 10,
+                };
+                let touch = Touch::new(&map, rect);
+                let found: Vec<u32> = index.candidates(&touch).collect();
+                assert!(found.is_sorted() && found.len() <= 9 * GROUP);
+                let missed = |&i: &u32| !touch.misses(&reads(i)) && !found.contains(&i);
+                assert_eq!((0..count as u32).find(missed), None);
+            }
         }
     }
 }

@@ -10,6 +10,7 @@ use super::march::{March, bent};
 use super::path::{HeightUnits, Path};
 use super::sides::inside;
 use super::simd::{Grid, Lanes};
+use super::touch::{TouchIndex, around};
 use super::{Asked, Parts, PrismHit, Prisms};
 use crate::ray::Ray;
 use crate::surface::DisplacedSurface;
@@ -20,6 +21,8 @@ const BENT: f32 = 0.1;
 /// One record per base triangle.
 pub struct UniformPrisms {
     pub records: Vec<Prism>,
+    /// Where they read the map.
+    pub index: TouchIndex,
     units: HeightUnits,
 }
 
@@ -34,6 +37,7 @@ impl UniformPrisms {
                     Prism::new(&patch, bounds.range(surface, prim))
                 })
                 .collect(),
+            index: TouchIndex::new(count as usize, |prim| around(surface.patch(prim).texels)),
             units: HeightUnits {
                 texel_per_world: unit / surface.displacement().scale,
                 texel_midlevel: unit * surface.displacement().midlevel,

@@ -305,7 +305,7 @@ impl DisplacedSurface {
     }
 
     /// The neighbour's edge in texels, as a triangle without area.
-    fn other_texels(&self, wall: &Wall) -> Option<[DVec2; 3]> {
+    pub(crate) fn other_texels(&self, wall: &Wall) -> Option<[DVec2; 3]> {
         let [a, b] = wall.other?.map(|st| self.map.to_texel(st.as_dvec2()));
         Some([a, b, b])
     }
