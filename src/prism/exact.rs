@@ -8,9 +8,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::block::{Ask, Block, Crossing, Cutter, Heights, LEAF, Record, nearest, outline};
+use super::block::{Ask, Block, Crossing, Cutter, Heights, LEAF, Record, nearest};
 use super::edits::EditBounds;
 use super::judge::{Cells, Found, Question, walls, within};
+use super::kernel::{Outline, outline};
 use super::march::polish::Root;
 use super::ray_frame::{RayFrame, axes};
 use super::simd::{Lanes, Task};
@@ -31,6 +32,7 @@ pub struct ExactPrisms {
     walled: Vec<u32>,
     /// By primitive.
     boxes: Vec<StoredBox>,
+    outline: Outline,
     /// What texels mean, when the prisms were made; and bits of the largest |D| since.
     heights: Heights,
     most: AtomicU32,
@@ -110,6 +112,7 @@ impl ExactPrisms {
             wholes: Vec::new(),
             walled: Vec::new(),
             boxes: Vec::new(),
+            outline: outline(),
             heights: Heights::new(surface),
             most: AtomicU32::new(0),
             index: TouchIndex::new(0, |_| NOWHERE),
@@ -128,7 +131,7 @@ impl ExactPrisms {
             let mut kept = first;
             for index in first..made.blocks.len() {
                 let block = made.blocks[index];
-                let bounds = outline(surface, &record, block, room);
+                let bounds = (made.outline)(surface, &record, block, room);
                 if bounds.is_valid() {
                     made.blocks[kept] = block;
                     made.boxes.push(StoredBox::new(bounds));
@@ -227,7 +230,7 @@ impl ExactPrisms {
         let record = self.record(primitive.triangle());
         let patch = surface.patch(primitive.triangle());
         match primitive {
-            Primitive::Block(block) => outline(surface, record, block, room),
+            Primitive::Block(block) => (self.outline)(surface, record, block, room),
             Primitive::Whole(_) => hull(&patch, [0, 1, 2], record.offsets()),
             Primitive::Walls(triangle) => {
                 let walls = surface.walls_of(triangle).iter();

@@ -5,13 +5,18 @@
 //! The AVX2 stamps are reached only through a [`Kernel`] made for [`SimdLevel::Avx2`], and [`Kernel::new`] makes that
 //! only where the machine supports it.
 
+use super::block::{self, Block, Record};
 use super::simd::{Portable, SimdLevel};
 use super::{Asked, March, PrismHit, exact, uniform};
-use crate::ray::Ray;
+use crate::ray::{Aabb, Ray};
+use crate::surface::DisplacedSurface;
 
 /// Whether there is a hit, which is written to where the last argument says: most calls are misses, and these leave nothing in memory.
 type Intersect = fn(&Asked<'_>, &Ray, &mut PrismHit) -> bool;
 type Occluded = fn(&Asked<'_>, &Ray) -> bool;
+
+/// The box of a block: see [`block::outline`].
+pub type Outline = fn(&DisplacedSurface, &Record, Block, Option<(f32, f32)>) -> Aabb;
 
 /// The chosen hit tests.
 #[derive(Clone, Copy)]
@@ -40,6 +45,11 @@ macro_rules! stamped {
             SimdLevel::Avx2 => portable,
         }
     }};
+}
+
+/// The function for boxes of this machine; they are the same at every level.
+pub fn outline() -> Outline {
+    stamped!(SimdLevel::detect(), block::outline(surface: &DisplacedSurface, record: &Record, block: Block, room: Option<(f32, f32)>) -> Aabb)
 }
 
 /// The hit tests of a march.

@@ -269,7 +269,7 @@ fn parts_and_boxes_hold_the_surface() {
             block,
             ..
         } = sight;
-        let bounds = outline(&case.surface, &case.record, *block, None);
+        let bounds = outline::<Portable>(&case.surface, &case.record, *block, None);
         let all = place.parts::<Portable>(&view.middle);
         let two = random.of(&[[0, 1], [2, 3], [4, 5], [6, 7], [5, 0]]);
         let places = leaves_of(two);

@@ -1,9 +1,12 @@
 //! A leaf seen along the ray: five rows of nine texels, displaced and projected, and the cells between them that may hold the ray.
 
+use glam::Vec3;
+
 use super::LEAF;
-use super::middle::{Axis, Heights};
+use super::middle::{Axis, Heights, Middle};
 use super::view::View;
 use crate::prism::simd::Lanes;
+use crate::ray::Aabb;
 
 /// Half a leaf.
 pub const HALF: [f32; 2] = [LEAF[0] as f32 / 2.0, LEAF[1] as f32 / 2.0];
@@ -32,20 +35,27 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// `None` where the normal turns too much for the series.
+    /// As the ray sees it; `None` where the normal turns too much for the series.
     #[inline(always)]
     pub fn new(view: &View, heights: &Heights, s: f32, t: f32) -> Option<Self> {
-        let normal = view.middle.normal.at(s, t);
-        let [a, b] = [
-            normal.dot(view.middle.normal.s),
-            normal.dot(view.middle.normal.t),
-        ];
-        let [aa, bb] = view.middle.spread.map(|n| n * n);
+        let leaf = Self::over(&view.middle, heights, s, t)?;
+        Some(Self {
+            off: view.noise + view.shear * leaf.off,
+            depth_off: view.depth_noise + view.per_length * leaf.off,
+            ..leaf
+        })
+    }
+
+    /// In space, without roundings.
+    #[inline(always)]
+    pub fn over(middle: &Middle, heights: &Heights, s: f32, t: f32) -> Option<Self> {
+        let normal = middle.normal.at(s, t);
+        let [a, b] = [normal.dot(middle.normal.s), normal.dot(middle.normal.t)];
+        let [aa, bb] = middle.spread.map(|n| n * n);
         let per_squared = 1.0 / normal.length_squared();
         let k = per_squared.sqrt();
         let (k3, k5) = (k * per_squared, k * per_squared * per_squared);
-        let x =
-            (HALF[0] * view.middle.spread[0] + HALF[1] * view.middle.spread[1]) * k * (1.0 + 1e-5);
+        let x = (HALF[0] * middle.spread[0] + HALF[1] * middle.spread[1]) * k * (1.0 + 1e-5);
         let least = 1.0 - x;
         // The terms of the series from the third on, of which each is below the last times x.
         let remainder = x * x * x / least;
@@ -58,12 +68,12 @@ impl Leaf {
                 -a * k3,
                 -b * k3,
                 0.5 * (3.0 * a * a * k5 - aa * k3),
-                3.0 * a * b * k5 - view.middle.twist * k3,
+                3.0 * a * b * k5 - middle.twist * k3,
                 0.5 * (3.0 * b * b * k5 - bb * k3),
             ],
-            off: view.noise + view.shear * off,
-            depth_off: view.depth_noise + view.per_length * off,
-            turn: (view.middle.spread[0] + view.middle.spread[1]) * k / least,
+            off,
+            depth_off: off,
+            turn: (middle.spread[0] + middle.spread[1]) * k / least,
         };
         (least > 0.5).then_some(leaf)
     }
@@ -91,31 +101,18 @@ impl Leaf {
         rows: &impl Rows,
     ) -> u32 {
         L::step();
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let tolerance = self.off + view.shear * 0.5 * self.beta(rise, heights.most);
         let tolerance = L::splat(tolerance);
-        let s0 = L::from_array([-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0]);
-        let s1 = s0 + one;
-        let [k, ks, kt, kss, kst, ktt] = self.k;
-        let (k, ks, kt) = (L::splat(k), L::splat(ks), L::splat(kt));
-        let (kss, kst, ktt) = (L::splat(kss), L::splat(kst), L::splat(ktt));
-        let (base0, base1) = (
-            s0.mul_add(s0.mul_add(kss, ks), k),
-            s1.mul_add(s1.mul_add(kss, ks), k),
-        );
-        let (slope0, slope1) = (s0.mul_add(kst, kt), s1.mul_add(kst, kt));
-        let (scale, offset) = (L::splat(heights.scale), L::splat(heights.offset));
+        let zero = L::splat(0.0);
+        let [s0, s1] = columns::<L>();
+        let offsets = Offsets::new(self, heights);
         let x = Columns::new(&view.x, self, s0, s1);
         let y = Columns::new(&view.y, self, s0, s1);
         let mut cells = 0;
         let mut last = [zero; 4];
         for row in 0..5 {
             let t = L::splat(row as f32 - 2.0);
-            let [h0, h1] = rows.row::<L>(row);
-            let k0 = t.mul_add(t.mul_add(ktt, slope0), base0);
-            let k1 = t.mul_add(t.mul_add(ktt, slope1), base1);
-            let w0 = h0.mul_add(scale, offset) * k0;
-            let w1 = h1.mul_add(scale, offset) * k1;
+            let [w0, w1] = offsets.at(t, rows.row::<L>(row));
             let [x0, x1] = x.at(t, w0, w1);
             let [y0, y1] = y.at(t, w0, w1);
             let now = [x0.min(x1), x0.max(x1), y0.min(y1), y0.max(y1)];
@@ -130,6 +127,120 @@ impl Leaf {
             last = now;
         }
         cells
+    }
+}
+
+/// The columns of vertices on the left of eight cells, and on the right, from the leaf's middle.
+#[inline(always)]
+fn columns<L: Lanes>() -> [L; 2] {
+    [
+        L::from_array([-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0]),
+        L::from_array([-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0]),
+    ]
+}
+
+/// w = D/|N'| at the columns of vertices.
+struct Offsets<L> {
+    base: [L; 2],
+    slope: [L; 2],
+    bend: L,
+    scale: L,
+    offset: L,
+}
+
+impl<L: Lanes> Offsets<L> {
+    #[inline(always)]
+    fn new(leaf: &Leaf, heights: &Heights) -> Self {
+        let [s0, s1] = columns::<L>();
+        let [k, ks, kt, kss, kst, ktt] = leaf.k;
+        let (k, ks, kt) = (L::splat(k), L::splat(ks), L::splat(kt));
+        let (kss, kst) = (L::splat(kss), L::splat(kst));
+        Self {
+            base: [
+                s0.mul_add(s0.mul_add(kss, ks), k),
+                s1.mul_add(s1.mul_add(kss, ks), k),
+            ],
+            slope: [s0.mul_add(kst, kt), s1.mul_add(kst, kt)],
+            bend: L::splat(ktt),
+            scale: L::splat(heights.scale),
+            offset: L::splat(heights.offset),
+        }
+    }
+
+    /// In row t, where these texels are stored.
+    #[inline(always)]
+    fn at(&self, t: L, [h0, h1]: [L; 2]) -> [L; 2] {
+        let k0 = t.mul_add(t.mul_add(self.bend, self.slope[0]), self.base[0]);
+        let k1 = t.mul_add(t.mul_add(self.bend, self.slope[1]), self.base[1]);
+        [
+            h0.mul_add(self.scale, self.offset) * k0,
+            h1.mul_add(self.scale, self.offset) * k1,
+        ]
+    }
+}
+
+/// What is above 0 where no cell around a vertex reaches into the triangle, or into the block, which has so many more columns.
+#[inline(always)]
+fn beside<L: Lanes>(middle: &Middle, s: L, t: L, column: L, columns: f32) -> L {
+    const SLACK: f32 = 1e-3;
+    let [b1, b2] = &middle.b;
+    let far = (b1.s + b2.s).abs() + (b1.t + b2.t).abs();
+    let reach = [b1.reach([1.0; 2]), b2.reach([1.0; 2]), far + 1.0];
+    let (b1, b2) = (b1.lanes(s, t), b2.lanes(s, t));
+    let inside = (b1 + L::splat(reach[0])).min(b2 + L::splat(reach[1]));
+    let inside = inside.min(L::splat(reach[2]) - (b1 + b2)) + L::splat(SLACK);
+    (L::splat(0.0) - inside).max(column - L::splat(columns))
+}
+
+impl Leaf {
+    /// The box of the displaced vertices that are around cells of the triangle and of the block, which has `count` cells more across and up;
+    /// empty where there are none.
+    #[inline(always)]
+    pub fn bounds<L: Lanes>(
+        &self,
+        middle: &Middle,
+        axes: &[Axis; 3],
+        heights: &Heights,
+        rows: &impl Rows,
+        count: [u32; 2],
+    ) -> Aabb {
+        // Far enough out for anything.
+        const AWAY: f32 = 1e30;
+        let [s0, s1] = columns::<L>();
+        let (zero, away) = (L::splat(0.0), L::splat(AWAY));
+        let offsets = Offsets::new(self, heights);
+        let x = Columns::new(&axes[0], self, s0, s1);
+        let y = Columns::new(&axes[1], self, s0, s1);
+        let z = Columns::new(&axes[2], self, s0, s1);
+        let (left, right) = (s0 + L::splat(HALF[0]), s1 + L::splat(HALF[0]));
+        let (from, to) = (s0 + L::splat(self.s), s1 + L::splat(self.s));
+        let columns = count[0] as f32;
+        let mut low = [L::splat(f32::INFINITY); 3];
+        let mut high = [L::splat(f32::NEG_INFINITY); 3];
+        for row in 0..=count[1].min(LEAF[1]) {
+            let t = L::splat(row as f32 - HALF[1]);
+            let up = t + L::splat(self.t);
+            let out0 = beside(middle, from, up, left, columns).max(zero) * away;
+            let out1 = beside(middle, to, up, right, columns).max(zero) * away;
+            let [w0, w1] = offsets.at(t, rows.row::<L>(row as usize));
+            let all = [x.at(t, w0, w1), y.at(t, w0, w1), z.at(t, w0, w1)];
+            for (axis, [a, b]) in all.into_iter().enumerate() {
+                low[axis] = low[axis].min((a + out0).min(b + out1));
+                high[axis] = high[axis].max((a - out0).max(b - out1));
+            }
+        }
+        let (mut min, mut max) = ([0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            min[axis] = -(zero - low[axis]).max_lane();
+            max[axis] = high[axis].max_lane();
+        }
+        if max[0] < -0.5 * AWAY || min[0] > 0.5 * AWAY {
+            return Aabb::EMPTY;
+        }
+        Aabb {
+            min: Vec3::from(min),
+            max: Vec3::from(max),
+        }
     }
 }
 

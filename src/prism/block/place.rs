@@ -49,6 +49,11 @@ impl<'m> Place<'m> {
         }
     }
 
+    /// Cells across and up.
+    pub fn count(&self) -> [u32; 2] {
+        self.count
+    }
+
     pub fn all(&self) -> Cells {
         let along = |k: usize| [self.first[k], self.first[k] + i64::from(self.count[k]) - 1];
         Cells {

@@ -132,7 +132,7 @@ fn blocks_have_what_the_judge_has() {
                 for &block in &blocks {
                     let texels = block.texels(surface.map(), &record);
                     if texels.low.cmple(texel).all() && texels.high.cmpge(texel).all() {
-                        let bounds = outline(&surface, &record, block, None);
+                        let bounds = outline::<Portable>(&surface, &record, block, None);
                         let (low, high) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
                         let off = (low - point).max(point - high).max(DVec3::ZERO);
                         assert!(off.max_element() < 1e-6, "{k} {block:?}: {off}");
