@@ -396,7 +396,7 @@ fn level_of_detail_of_a_scene_needs_the_exact_march() {
 
 /// Bytes of the quad: 108 for each of its two base triangles; 8 and a box for each of their blocks, of which the edges of the map's
 /// period make four a triangle.
-const PRISMS: u64 = 2 * 108 + 2 * 4 * (8 + 24);
+const PRISMS: u64 = 2 * 108 + 2 * 4 * (8 + 24) + 2 * 32;
 
 #[test]
 fn info_counts_triangles_and_bytes() {

@@ -234,7 +234,8 @@ impl Prisms {
     }
 
     /// Bytes beside mesh and map: 108 per base triangle; of the exact march 32 per block of up to 32x32 texels, or 28 per base triangle
-    /// that has none, and where seams are closed 28 per base triangle with walls and 28 per wall; and 1 per base triangle for level of detail.
+    /// that has none, and where seams are closed 28 per base triangle with walls and 28 per wall; 32 for every 64 primitives, by which an edit
+    /// finds what it touches; and 1 per base triangle for level of detail.
     pub fn bytes(&self) -> usize {
         let prisms = match &self.parts {
             Parts::Exact(exact) => exact.bytes(),

@@ -273,7 +273,8 @@ fn a_prism_is_108_bytes() {
         FINE,
     )
     .unwrap();
-    assert_eq!(prisms.bytes(), 2 * 108);
+    // And the box of a group of primitives, and that of a group of such.
+    assert_eq!(prisms.bytes(), 2 * 108 + 2 * 32);
 }
 
 #[test]

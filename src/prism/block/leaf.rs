@@ -56,9 +56,10 @@ impl Leaf {
         let k = per_squared.sqrt();
         let (k3, k5) = (k * per_squared, k * per_squared * per_squared);
         let x = (HALF[0] * middle.spread[0] + HALF[1] * middle.spread[1]) * k * (1.0 + 1e-5);
-        let least = 1.0 - x;
+        // No less than 1 / (1 - x), where x is 1/2 at most: a chord of a convex function.
+        let longer = 1.0 + 2.0 * x;
         // The terms of the series from the third on, of which each is below the last times x.
-        let remainder = x * x * x / least;
+        let remainder = x * x * x * longer;
         let off = heights.most * (1.0 + x) * remainder;
         let leaf = Self {
             s,
@@ -73,9 +74,9 @@ impl Leaf {
             ],
             off,
             depth_off: off,
-            turn: (middle.spread[0] + middle.spread[1]) * k / least,
+            turn: (middle.spread[0] + middle.spread[1]) * k * longer,
         };
-        (least > 0.5).then_some(leaf)
+        (x < 0.5).then_some(leaf)
     }
 
     /// 1/|N'| at a vertex, from the leaf's middle.

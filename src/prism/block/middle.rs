@@ -164,6 +164,8 @@ impl Middle {
         // 1/|N'| along a line is the generating function of the Legendre polynomials, of which none exceeds 1: terms shrink by `turn`.
         let turn = (half[0] * spread[0] + half[1] * spread[1]) * k * (1.0 + 1e-5);
         let least = 1.0 - turn;
+        // No less than 1/least, where that is at least 1/4: a chord of a convex function.
+        let longer = 1.0 + 4.0 * turn;
         let [b1_s, b1_t, b2_s, b2_t] = *record.slopes();
         let b = |s: f32, t: f32| Affine {
             c: ds * s + dt * t,
@@ -186,9 +188,9 @@ impl Middle {
                 s: slope * normal.c.dot(n_s),
                 t: slope * normal.c.dot(n_t),
             },
-            k_off: k * turn * turn / least + 1e-6 * k,
+            k_off: k * turn * turn * longer + 1e-6 * k,
             least,
-            size: far_s * p_s_sum + far_t * p_t_sum + heights.most * k / least * along_normals,
+            size: far_s * p_s_sum + far_t * p_t_sum + heights.most * k * longer * along_normals,
         }
     }
 

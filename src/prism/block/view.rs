@@ -101,8 +101,9 @@ impl View {
         let (ua, va) = (u.to_array(), v.to_array());
         let (nu, nv) = (middle.axis(&ua).n.c, middle.axis(&va).n.c);
         let length = (nu * nu + nv * nv).sqrt();
-        let (cos, sin) = if length > f32::MIN_POSITIVE {
-            (nu / length, nv / length)
+        let (cos, sin) = if length > 1e-30 {
+            let inverse = 1.0 / length;
+            (nu * inverse, nv * inverse)
         } else {
             (1.0, 0.0)
         };
