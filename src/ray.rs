@@ -110,6 +110,25 @@ impl Aabb {
         }
     }
 
+    /// Where a ray enters the box within its interval.
+    pub(crate) fn entry(&self, ray: &Ray) -> Option<f64> {
+        let (mut enters, mut leaves) = (f64::from(ray.tnear), f64::from(ray.tfar));
+        for axis in 0..3 {
+            let (origin, direction) = (f64::from(ray.origin[axis]), f64::from(ray.direction[axis]));
+            let [low, high] = [self.min[axis], self.max[axis]].map(|p| f64::from(p) - origin);
+            if direction == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = (low / direction, high / direction);
+            enters = enters.max(a.min(b));
+            leaves = leaves.min(a.max(b));
+        }
+        (enters <= leaves).then_some(enters)
+    }
+
     /// The smallest box over both.
     pub fn union(self, other: Self) -> Self {
         Self {

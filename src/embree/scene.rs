@@ -427,7 +427,7 @@ impl Scene {
         coherence: Coherence,
     ) -> [Option<Hit>; RayPacket::LANES] {
         let valid = self.0.reach.admitted(rays);
-        if valid & !rays.level() != 0 {
+        if valid & !rays.level(self.0.reach.far()) != 0 {
             return std::array::from_fn(|lane| self.intersect1(&rays.ray(lane)));
         }
         let mut hits = [BLANK_HIT; RayPacket::LANES];
@@ -447,7 +447,7 @@ impl Scene {
     /// [`occluded1`](Self::occluded1) for every lane: bit i tells of lane i, and is 0 for an empty one.
     pub fn occluded8(&self, rays: &RayPacket, coherence: Coherence) -> u8 {
         let valid = self.0.reach.admitted(rays);
-        if valid & !rays.level() != 0 {
+        if valid & !rays.level(self.0.reach.far()) != 0 {
             return lanes_of(valid)
                 .filter(|&lane| self.occluded1(&rays.ray(lane)))
                 .fold(0, |bits, lane| bits | 1 << lane);

@@ -415,6 +415,10 @@ fn first_in_block<L: Lanes>(
     ray: &Ray,
     any: bool,
 ) -> Option<Crossing> {
+    // Backends ask about more than the boxes that a ray meets, each about others.
+    if L::COUNTED && exact.bounds(asked.primitive).entry(ray).is_none() {
+        return None;
+    }
     let record = exact.record(block.triangle);
     let moved;
     let record = match asked.corners {

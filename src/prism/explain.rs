@@ -9,7 +9,7 @@ use super::judge::Found;
 use super::ray_frame::{RayFrame, axes};
 use super::simd::{Lanes, Portable, Quad};
 use super::{Parts, Prisms};
-use crate::ray::{Aabb, Ray};
+use crate::ray::Ray;
 use crate::surface::Patch;
 
 /// A point of a ray over a base triangle.
@@ -132,7 +132,7 @@ impl Prisms {
         let mut blocks: Vec<_> = exact
             .primitives_of(triangle)
             .filter_map(|index| match exact.primitive(index) {
-                Primitive::Block(block) => Some((entry(self.bounds(index), ray), block)),
+                Primitive::Block(block) => Some((self.bounds(index).entry(ray), block)),
                 Primitive::Whole(_) | Primitive::Walls(_) => None,
             })
             .collect();
@@ -185,25 +185,6 @@ impl Prisms {
             }),
         })
     }
-}
-
-/// Where a ray enters a box within its interval.
-fn entry(bounds: Aabb, ray: &Ray) -> Option<f64> {
-    let (mut enters, mut leaves) = (f64::from(ray.tnear), f64::from(ray.tfar));
-    for axis in 0..3 {
-        let (origin, direction) = (f64::from(ray.origin[axis]), f64::from(ray.direction[axis]));
-        let [low, high] = [bounds.min[axis], bounds.max[axis]].map(|p| f64::from(p) - origin);
-        if direction == 0.0 {
-            if low > 0.0 || high < 0.0 {
-                return None;
-            }
-            continue;
-        }
-        let (a, b) = (low / direction, high / direction);
-        enters = enters.max(a.min(b));
-        leaves = leaves.min(a.max(b));
-    }
-    (enters <= leaves).then_some(enters)
 }
 
 /// The ray over the map, where it is in the prism once.

@@ -20,7 +20,7 @@ pub fn count() {
 ///
 /// A step is one look into the displacement map. Of the exact march: at the smallest and largest heights of eight parts of a block
 /// (16x8 texels each; then, of those that the ray may meet, of 8x4), or at all texels of one part of 8x4. Of the uniform march: at
-/// eight of its samples. What is decided in f64 is not counted, nor are base triangles that the exact march does not cut into blocks, and the uniform
+/// eight of its samples. Blocks count where the ray meets their boxes, whatever a backend's tree asks about. What is decided in f64 is not counted, nor are base triangles that the exact march does not cut into blocks, and the uniform
 /// march's bent prisms, which take another route.
 ///
 /// ```
@@ -114,8 +114,8 @@ mod tests {
         let all = || 0..prisms.len() as u32;
         let beside = Ray::new(Vec3::new(2.0, 2.0, 1.0), Vec3::NEG_Z);
         for ray in [over(), beside] {
-            // Eight parts, all missed.
-            assert!(all().all(|primitive| steps(&prisms, primitive, &ray) == 1));
+            // Eight parts at most, all missed.
+            assert!(all().all(|primitive| steps(&prisms, primitive, &ray) <= 1));
         }
         let down = Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z);
         let grazing = Ray::new(Vec3::new(-0.5, 0.25, 0.05), Vec3::new(1.0, 0.0, -0.06));
@@ -153,9 +153,9 @@ mod tests {
                     let (hit, none) = count_steps(|| usual.intersect(primitive, &ray));
                     let (same, some) = count_steps(|| counting.intersect(primitive, &ray));
                     assert_eq!((hit, none), (same, 0));
-                    assert!(some > 0);
+                    assert!(hit.is_none() || some > 0);
                     let (occluded, some) = count_steps(|| counting.occluded(primitive, &ray));
-                    assert!(occluded == hit.is_some() && some > 0);
+                    assert!(occluded == hit.is_some() && (!occluded || some > 0));
                 }
             }
         }

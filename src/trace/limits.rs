@@ -107,7 +107,7 @@ impl World {
                 world,
             });
         }
-        Ok(parts.reach)
+        Ok(parts.reach.around(world))
     }
 }
 

@@ -53,13 +53,19 @@ pub enum TransformError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayReach {
     origin: f32,
+    /// No coordinate of the world is larger; infinite where that is not known.
+    size: f32,
 }
+
+/// Times the size of the world from which rays are brought near it: a box test's t has no digits left for the world from much farther.
+const FAR: f32 = 4096.0;
 
 impl Default for RayReach {
     /// That of a world without instances.
     fn default() -> Self {
         Self {
             origin: MAX_COORDINATE,
+            size: f32::INFINITY,
         }
     }
 }
@@ -95,7 +101,19 @@ impl RayReach {
     pub(super) fn up_to(self, largest: f32) -> Self {
         Self {
             origin: self.origin.min(largest),
+            ..self
         }
+    }
+
+    /// The same for a world whose largest coordinate is known.
+    pub(super) fn around(self, size: f32) -> Self {
+        Self { size, ..self }
+    }
+
+    /// Coordinates of origins from which rays are brought near the world.
+    #[inline(always)]
+    pub(crate) fn far(&self) -> f32 {
+        FAR * self.size
     }
 
     /// [`through`](Self::through), and rays of at most this largest coordinate in the object's space.
@@ -152,16 +170,16 @@ fn products(a: DVec3, b: DVec3) -> DVec3 {
 }
 
 impl RayReach {
-    /// The first hit of `ray`; `ask` is asked about rays with a direction near length 1 only.
+    /// The first hit of `ray`; `ask` is asked about rays with a direction near length 1 only, from not too far.
     #[inline(always)]
     pub(crate) fn intersect(&self, ray: &Ray, ask: impl Fn(&Ray) -> Option<Hit>) -> Option<Hit> {
         if !self.admits(ray) {
             return None;
         }
-        if ray.is_level() {
+        if ray.is_level(self.far()) {
             ask(ray)
         } else {
-            intersect_leveled(ray, &ask)
+            intersect_leveled(ray, self.size, &ask)
         }
     }
 
@@ -174,17 +192,17 @@ impl RayReach {
         first: impl Fn(&Ray) -> Option<Hit>,
     ) -> bool {
         self.admits(ray)
-            && if ray.is_level() {
+            && if ray.is_level(self.far()) {
                 ask(ray)
             } else {
-                intersect_leveled(ray, &first).is_some()
+                intersect_leveled(ray, self.size, &first).is_some()
             }
     }
 }
 
 #[cold]
-fn intersect_leveled(ray: &Ray, ask: &dyn Fn(&Ray) -> Option<Hit>) -> Option<Hit> {
-    let leveled = ray.leveled();
+fn intersect_leveled(ray: &Ray, size: f32, ask: &dyn Fn(&Ray) -> Option<Hit>) -> Option<Hit> {
+    let leveled = ray.leveled(size);
     let hit = ask(&leveled.ray)?;
     let t = leveled.original_t(hit.t)?;
     Some(Hit { t, ..hit })
@@ -229,7 +247,7 @@ mod tests {
             let Ok(reach) = through(transform) else { return Ok(()) };
             let ray = Ray::new(origin * reach.origin(), direction);
             prop_assert!(reach.admits(&ray));
-            let ray = ray.leveled().ray;
+            let ray = ray.leveled(f32::INFINITY).ray;
             let inverse = transform.inverse();
             let local = Ray {
                 origin: inverse.transform_point3(ray.origin),

@@ -85,6 +85,9 @@ pub(crate) trait Lanes:
     /// Runs a task in a function of its own, stamped for the instruction set: for what would bloat its callers.
     fn outline<T: Task<Self>>(task: T) -> T::Output;
 
+    /// Whether steps are counted.
+    const COUNTED: bool = false;
+
     /// Called at every step of a march ([`count_steps`](super::count_steps)). Only lanes that count them do anything.
     #[inline(always)]
     fn step() {}

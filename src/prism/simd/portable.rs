@@ -39,6 +39,8 @@ impl<const COUNTED: bool> Lanes for Portable<COUNTED> {
         task.run()
     }
 
+    const COUNTED: bool = COUNTED;
+
     #[inline(always)]
     fn step() {
         if COUNTED {

@@ -149,7 +149,7 @@ fn an_edit_of_a_whole_large_map_leaves_what_a_new_one_has() {
 }
 
 #[test]
-fn the_pyramid_takes_at_most_a_ninth_of_the_texels() {
+fn the_pyramid_takes_at_most_a_fifth_of_the_texels() {
     for kind in KINDS {
         for (width, height) in [
             (64, 64),
@@ -162,7 +162,8 @@ fn the_pyramid_takes_at_most_a_ninth_of_the_texels() {
         ] {
             let map = map(kind, width, height, Wrap::Repeat);
             let (bytes, texels) = (map.pyramid().bytes(), width * height * kind.bytes());
-            assert!(9 * bytes <= texels, "{kind} {width}x{height}: {bytes}");
+            // Tiles of 32x32 texels are whole: of small maps a good deal is beyond the edge.
+            assert!(5 * bytes <= texels, "{kind} {width}x{height}: {bytes}");
             assert_eq!(map.bytes(), map.texels().bytes() + bytes);
         }
     }
@@ -180,16 +181,18 @@ fn pairs_are_stored_as_kernels_expect_them() {
             }
         }
     };
-    assert_eq!(entries(Texels::U8(vec![0x12, 0xfe])), [0xfe12, 0, 0]);
-    assert_eq!(
-        entries(Texels::U16(vec![0x1234, 0xfedc])),
-        [0xfedc_1234, 0, 0]
-    );
-    let [low, high] = [-2.5f32, 0.75].map(f32::to_bits);
-    assert_eq!(
-        entries(Texels::F32(vec![0.75, -2.5])),
-        [low, high, 0, 0, 0, 0]
-    );
+    // One pair, and 31 of its tile that are beyond the map; two more behind.
+    let stored = |mut pairs: Vec<u32>, words: usize| {
+        pairs.resize((32 + 2) * words, 0);
+        pairs
+    };
+    let u8s = entries(Texels::U8(vec![0x12, 0xfe]));
+    assert_eq!(u8s, stored(vec![0xfe12], 1));
+    let u16s = entries(Texels::U16(vec![0x1234, 0xfedc]));
+    assert_eq!(u16s, stored(vec![0xfedc_1234], 1));
+    let bits = [-2.5f32, 0.75].map(f32::to_bits);
+    let floats = entries(Texels::F32(vec![0.75, -2.5]));
+    assert_eq!(floats, stored(bits.to_vec(), 2));
 }
 
 /// Seconds of the fastest of some runs.
