@@ -53,8 +53,7 @@ impl Cutter {
         let size = high - low;
         let longest = size.max_element();
         let height = (b - a).perp_dot(c - a).abs() / longest;
-        let fits = longest >= FEWEST_TEXELS
-            && longest <= MOST_TEXELS
+        let fits = (FEWEST_TEXELS..=MOST_TEXELS).contains(&longest)
             && low.abs().max(high.abs()).max_element() <= MOST_TEXELS * 2.0
             && height >= THINNEST * longest
             && size.element_product() / f64::from(SIDE * SIDE) <= MOST_BLOCKS

@@ -74,7 +74,7 @@ pub fn nearest<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> Option<Crossing> {
             break;
         }
         let rise = leaves.rise(leaf) * heights.scale.abs();
-        if search.leaf::<L>(&mut view, &heights, &place, leaves.place(leaf), rise) {
+        if search.leaf::<L>(&mut view, &place, leaves.place(leaf), rise) {
             break;
         }
     }
@@ -191,22 +191,22 @@ impl<'a> Search<'a> {
     fn leaf<L: Lanes>(
         &mut self,
         view: &mut View,
-        heights: &Heights,
         place: &Place<'_>,
         leaf: [u32; 2],
         rise: f32,
     ) -> bool {
+        let ask = self.ask;
         let [i, j] = [leaf[0] * LEAF[0], leaf[1] * LEAF[1]];
-        let [s, t] = place.from_middle(&view.middle, [i, j], LEAF);
-        let Some(leaf) = Leaf::new(view, heights, s, t) else {
+        let [s, t] = place.middle_of(&view.middle, [i, j], LEAF);
+        let Some(leaf) = Leaf::new(view, &ask.heights, s, t) else {
             self.decide::<L>(place.part(i, j));
             return self.ask.any && self.nearest.is_some();
         };
         match place.stored(i, j) {
-            Some(texels) => self.cells::<L>(view, heights, place, &leaf, rise, [i, j], &texels),
+            Some(texels) => self.cells::<L>(view, place, &leaf, rise, [i, j], &texels),
             None => {
                 let texels = place.continued(i, j);
-                self.cells::<L>(view, heights, place, &leaf, rise, [i, j], &texels)
+                self.cells::<L>(view, place, &leaf, rise, [i, j], &texels)
             }
         }
     }
@@ -215,13 +215,13 @@ impl<'a> Search<'a> {
     fn cells<L: Lanes>(
         &mut self,
         view: &mut View,
-        heights: &Heights,
         place: &Place<'_>,
         leaf: &Leaf,
         rise: f32,
         [i, j]: [u32; 2],
         texels: &impl Rows,
     ) -> bool {
+        let heights = &self.ask.heights;
         let mut cells = leaf.cells::<L>(view, heights, rise, texels) & place.mask(i, j);
         while cells != 0 {
             let bit = cells.trailing_zeros();

@@ -85,7 +85,7 @@ impl Frame<'_> {
     #[inline(always)]
     fn of_texels<L: Lanes>(&self, leaf: [u32; 2], rise: f32) -> Option<Aabb> {
         let [i, j] = [leaf[0] * LEAF[0], leaf[1] * LEAF[1]];
-        let [s, t] = self.place.from_middle(self.middle, [i, j], LEAF);
+        let [s, t] = self.place.middle_of(self.middle, [i, j], LEAF);
         let leaf = Leaf::over(self.middle, self.heights, s, t)?;
         Some(match self.place.stored(i, j) {
             Some(rows) => self.of_rows::<L>(&leaf, rise, [i, j], &rows),

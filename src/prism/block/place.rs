@@ -64,7 +64,7 @@ impl<'m> Place<'m> {
 
     /// The middle of a rectangle of cells (from the block's first one), in texels from the middle of the block's part of the triangle.
     #[inline(always)]
-    pub fn from_middle(&self, middle: &Middle, cell: [u32; 2], size: [u32; 2]) -> [f32; 2] {
+    pub fn middle_of(&self, middle: &Middle, cell: [u32; 2], size: [u32; 2]) -> [f32; 2] {
         let [x, y] = [0, 1].map(|k: usize| {
             (u32::from(self.block.place[k]) + cell[k] + size[k] / 2) as f32 - middle.place[k]
         });
@@ -74,7 +74,7 @@ impl<'m> Place<'m> {
     /// Parts of the block, each of two by two leaves.
     #[inline(always)]
     pub fn parts<L: Lanes>(&self, middle: &Middle) -> Parts<L> {
-        let [s, t] = self.from_middle(middle, [0; 2], PART);
+        let [s, t] = self.middle_of(middle, [0; 2], PART);
         Parts {
             s: L::splat(s) + L::from_array([0.0, 16.0, 0.0, 16.0, 0.0, 16.0, 0.0, 16.0]),
             t: L::splat(t) + L::from_array([0.0, 0.0, 8.0, 8.0, 16.0, 16.0, 24.0, 24.0]),
@@ -86,7 +86,7 @@ impl<'m> Place<'m> {
     /// The leaves of two parts.
     #[inline(always)]
     pub fn leaves<L: Lanes>(&self, [a, b]: [u32; 2], middle: &Middle) -> Parts<L> {
-        let [s, t] = self.from_middle(middle, [0; 2], LEAF);
+        let [s, t] = self.middle_of(middle, [0; 2], LEAF);
         let (across, up) = (PART[0] as f32, PART[1] as f32);
         let (sa, sb) = (s + (a & 1) as f32 * across, s + (b & 1) as f32 * across);
         let (ta, tb) = (t + (a >> 1) as f32 * up, t + (b >> 1) as f32 * up);

@@ -384,7 +384,7 @@ pub fn leaves_on(
             let n = (cell[k] as i64 - place.first[k]) as u32;
             n / LEAF[k] * LEAF[k]
         });
-        let [s, t] = place.from_middle(&view.middle, at, LEAF);
+        let [s, t] = place.middle_of(&view.middle, at, LEAF);
         let Some(leaf) = Leaf::new(&view, &heights, s, t) else {
             continue;
         };

@@ -82,7 +82,7 @@ pub fn told<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> (BlockTold, Option<Found>) {
             let rise = leaves.rise(leaf) * heights.scale.abs();
             leaf_told.part.fate = Fate::Judged;
             seen::<L>(&view, &heights, &place, at, rise, &mut leaf_told);
-            search.leaf::<L>(&mut view, &heights, &place, at, rise);
+            search.leaf::<L>(&mut view, &place, at, rise);
         }
         told.leaves.push(leaf_told);
     }
@@ -107,7 +107,7 @@ fn seen<L: Lanes>(
     told: &mut LeafTold,
 ) {
     let [i, j] = [at[0] * LEAF[0], at[1] * LEAF[1]];
-    let [s, t] = place.from_middle(&view.middle, [i, j], LEAF);
+    let [s, t] = place.middle_of(&view.middle, [i, j], LEAF);
     let Some(leaf) = Leaf::new(view, heights, s, t) else {
         return;
     };
