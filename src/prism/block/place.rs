@@ -88,12 +88,14 @@ impl<'m> Place<'m> {
     pub fn leaves<L: Lanes>(&self, [a, b]: [u32; 2], middle: &Middle) -> Parts<L> {
         let [s, t] = self.middle_of(middle, [0; 2], LEAF);
         let (across, up) = (PART[0] as f32, PART[1] as f32);
-        let (sa, sb) = (s + (a & 1) as f32 * across, s + (b & 1) as f32 * across);
-        let (ta, tb) = (t + (a >> 1) as f32 * up, t + (b >> 1) as f32 * up);
+        let [sa, sb] = [a, b].map(|part| (part & 1) as f32 * across);
+        let [ta, tb] = [a, b].map(|part| (part >> 1) as f32 * up);
+        // Whole numbers: exact.
+        let second = L::from_array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
         Parts {
-            s: L::from_array([sa, sa, sa, sa, sb, sb, sb, sb])
+            s: second.mul_add(L::splat(sb - sa), L::splat(s + sa))
                 + L::from_array([0.0, 8.0, 0.0, 8.0, 0.0, 8.0, 0.0, 8.0]),
-            t: L::from_array([ta, ta, ta, ta, tb, tb, tb, tb])
+            t: second.mul_add(L::splat(tb - ta), L::splat(t + ta))
                 + L::from_array([0.0, 0.0, 4.0, 4.0, 0.0, 0.0, 4.0, 4.0]),
             half: super::leaf::HALF,
             range: self.ranges(0, LEAF, [4 * a as usize, 4 * b as usize], || {
