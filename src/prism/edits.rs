@@ -11,7 +11,7 @@ use crate::surface::{DisplacedSurface, DisplacementMap, TexelKind, TexelRect};
 /// How much room prisms have for edits of the map: tracing speed against the cost of an edit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EditBounds {
-    /// What the map holds under each prism. Rays are fastest (a third to a half over the other where heights vary much), and an
+    /// What the map holds under each prism. Rays are fastest (twice as fast as with the other, and more where heights vary much), and an
     /// edit beyond the heights that a prism has had so far makes its bounds grow: backends must take them again.
     #[default]
     Tight,
