@@ -11,7 +11,7 @@ use common::scene::{RANGE, random, rock_map, sphere};
 use glam::{Affine3A, Vec2, Vec3};
 use prismarch::bvh::BvhTracer;
 use prismarch::prism::{EditBounds, March, PrismOptions, Prisms};
-use prismarch::ray::Ray;
+use prismarch::ray::{Ray, RayPacket};
 use prismarch::surface::{
     DisplacedSurface, Displacement, DisplacementMap, Seams, TexelRect, Texels, UvTransform, Wrap,
 };
@@ -229,6 +229,16 @@ fn assert_same(tracer: &impl Tracer, new: &impl Tracer, seed: u32) {
         assert_eq!(tracer.occluded(&ray), a.is_some(), "{ray:?}");
     }
     assert!(hits > 500, "{hits}");
+    let all: Vec<Ray> = rays(seed.wrapping_mul(0x1234_5677)).collect();
+    for eight in all.chunks_exact(RayPacket::LANES) {
+        let packet = RayPacket::from_rays(eight);
+        let (found, occluded) = (tracer.intersect8(&packet), tracer.occluded8(&packet));
+        for (lane, ray) in eight.iter().enumerate() {
+            let t = |hit: Option<Hit>| hit.map(|hit| hit.t.to_bits());
+            assert_eq!(t(found[lane]), t(tracer.intersect(ray)), "{ray:?}");
+            assert_eq!(occluded >> lane & 1 == 1, found[lane].is_some(), "{ray:?}");
+        }
+    }
 }
 
 #[test]
@@ -270,6 +280,31 @@ mod embree {
                 |tracer, world, map, rect| tracer.map_edited(world, map, rect).unwrap(),
             );
         }
+    }
+
+    /// All is in one scene again, and the edits are in it.
+    #[test]
+    fn a_settled_tracer_is_as_good_as_a_new_one() {
+        let stage = Stage::new(Wrap::Repeat);
+        let world = stage.world(EditBounds::Tight);
+        let build = |world: &World| EmbreeTracer::new(world, &EmbreeOptions::default()).unwrap();
+        let mut tracer = build(&world);
+        let first = |scene: &prismarch::embree::Scene| -> Vec<_> {
+            let hits = rays(3).map(|ray| scene.intersect1(&ray));
+            hits.map(|hit| hit.map(|hit| hit.t.to_bits())).collect()
+        };
+        let mut commits = 0;
+        for number in 0..4 {
+            let rect = stage.edit(number, [0, u16::MAX]);
+            let edited = tracer.map_edited(&world, &stage.map, rect).unwrap();
+            commits += u32::from(edited.committed);
+        }
+        let new = build(&world);
+        // What has grown is elsewhere, or there was nothing to settle.
+        assert!(commits > 0 && first(tracer.scene()) != first(new.scene()));
+        tracer.settle(&world).unwrap();
+        assert_eq!(first(tracer.scene()), first(new.scene()));
+        assert_same(&tracer, &new, 3);
     }
 
     /// A moving object's boxes are its triangles' ranges at every time step: those that an edit widens are told to Embree.

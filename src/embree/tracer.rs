@@ -112,14 +112,8 @@ impl EmbreeTracer {
         let grown: Vec<Option<Arc<Grown>>> = (self.parts.iter())
             .map(|part| part.as_ref().map(|part| Arc::new(part.grown())))
             .collect();
-        let len = |all: usize, part: usize| all + part;
-        let all = self
-            .parts
-            .iter()
-            .flatten()
-            .map(|part| part.len())
-            .fold(0, len);
-        let left = grown.iter().flatten().map(|grown| grown.len()).fold(0, len);
+        let all: usize = self.parts.iter().flatten().map(|part| part.len()).sum();
+        let left: usize = grown.iter().flatten().map(|grown| grown.len()).sum();
         if left as f64 > MOST_GROWN * all as f64 {
             return self.settle(world);
         }

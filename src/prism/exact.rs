@@ -6,14 +6,13 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, Vec3};
 
-use super::block::{Ask, Block, Crossing, Cutter, Heights, LEAF, Record, nearest};
-use super::edits::EditBounds;
+use super::block::{Ask, Block, Crossing, Cutter, Heights, LEAF, Outline, Record, nearest};
 use super::judge::{Cells, Found, Question, walls, within};
-use super::kernel::{Outline, outline};
 use super::march::polish::Root;
 use super::ray_frame::{RayFrame, axes};
+use super::room::{self, EditBounds};
 use super::simd::{Lanes, Task};
 use super::touch::{NOWHERE, Touch, TouchIndex, around, union};
 use super::{MarchError, Parts, PrismHit, Prisms};
@@ -81,7 +80,7 @@ impl StoredBox {
         let mut grown = false;
         for axis in 0..3 {
             let ends = [&self.0[axis], &self.0[axis + 3]];
-            grown |= super::edits::widen(ends, [wanted.min[axis], wanted.max[axis]]);
+            grown |= room::widen(ends, [wanted.min[axis], wanted.max[axis]]);
         }
         grown
     }
@@ -94,13 +93,19 @@ impl ExactPrisms {
     /// # Errors
     ///
     /// More primitives than [`Self::MOST`].
-    pub fn new(surface: &DisplacedSurface, bounds: EditBounds) -> Result<Self, MarchError> {
-        Self::limited(surface, bounds, Self::MOST)
+    /// `outline` makes the boxes of blocks.
+    pub fn new(
+        surface: &DisplacedSurface,
+        bounds: EditBounds,
+        outline: Outline,
+    ) -> Result<Self, MarchError> {
+        Self::limited(surface, bounds, outline, Self::MOST)
     }
 
     fn limited(
         surface: &DisplacedSurface,
         bounds: EditBounds,
+        outline: Outline,
         max: usize,
     ) -> Result<Self, MarchError> {
         let count = surface.mesh().triangles().len() as u32;
@@ -112,7 +117,7 @@ impl ExactPrisms {
             wholes: Vec::new(),
             walled: Vec::new(),
             boxes: Vec::new(),
-            outline: outline(),
+            outline,
             heights: Heights::new(surface),
             most: AtomicU32::new(0),
             index: TouchIndex::new(0, |_| NOWHERE),
@@ -231,13 +236,13 @@ impl ExactPrisms {
         let patch = surface.patch(primitive.triangle());
         match primitive {
             Primitive::Block(block) => (self.outline)(surface, record, block, room),
-            Primitive::Whole(_) => hull(&patch, [0, 1, 2], record.offsets()),
+            Primitive::Whole(_) => patch.hull([0, 1, 2], record.offsets()),
             Primitive::Walls(triangle) => {
                 let walls = surface.walls_of(triangle).iter();
                 walls.fold(Aabb::EMPTY, |bounds, wall| {
                     let side = usize::from(wall.side);
                     let corners = [(side + 1) % 3, (side + 2) % 3];
-                    bounds.union(hull(&patch, corners, record.offsets()))
+                    bounds.union(patch.hull(corners, record.offsets()))
                 })
             }
         }
@@ -301,27 +306,6 @@ impl ExactPrisms {
     /// The primitives of a base triangle.
     pub fn primitives_of(&self, triangle: u32) -> impl Iterator<Item = u32> + use<> {
         self.blocks_of(triangle).chain(self.others_of(triangle))
-    }
-}
-
-/// Conservative bounds of S between some corners of a base triangle: every point is sum b_i (v_i + w n_i) for one w of the range, so it is in the
-/// hull of these; and no further than the largest |D| from the triangle.
-pub fn hull<const N: usize>(patch: &Patch<'_>, corners: [usize; N], offsets: [f32; 2]) -> Aabb {
-    let offsets = offsets.map(f64::from);
-    let (mut hull_min, mut hull_max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for corner in corners {
-        let (v, n) = (patch.vertices[corner], patch.normals[corner]);
-        (min, max) = (min.min(v), max.max(v));
-        for w in offsets {
-            (hull_min, hull_max) = (hull_min.min(v + w * n), hull_max.max(v + w * n));
-        }
-    }
-    // w |N'| = D and |N'| <= 1.
-    let reach = offsets[0].abs().max(offsets[1].abs());
-    Aabb {
-        min: hull_min.max(min - reach).as_vec3(),
-        max: hull_max.min(max + reach).as_vec3(),
     }
 }
 

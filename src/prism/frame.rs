@@ -53,12 +53,12 @@ impl Prism {
 
     /// Whether there is room for this range of D.
     pub fn holds(&self, range: [f64; 2]) -> bool {
-        super::edits::holds(self.range(), outward(range))
+        super::room::holds(self.range(), outward(range))
     }
 
     /// Makes room for this range of D; whether there was none.
     pub fn widen(&self, range: [f64; 2]) -> bool {
-        super::edits::widen([&self.range[0], &self.range[1]], outward(range))
+        super::room::widen([&self.range[0], &self.range[1]], outward(range))
     }
 
     /// A vector in the frame: (b, c, h, b + c).

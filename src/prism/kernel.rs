@@ -5,7 +5,7 @@
 //! The AVX2 stamps are reached only through a [`Kernel`] made for [`SimdLevel::Avx2`], and [`Kernel::new`] makes that
 //! only where the machine supports it.
 
-use super::block::{self, Block, Record};
+use super::block::{self, Block, Outline, Record};
 use super::simd::{Portable, SimdLevel};
 use super::{Asked, March, PrismHit, exact, uniform};
 use crate::ray::{Aabb, Ray};
@@ -14,9 +14,6 @@ use crate::surface::DisplacedSurface;
 /// Whether there is a hit, which is written to where the last argument says: most calls are misses, and these leave nothing in memory.
 type Intersect = fn(&Asked<'_>, &Ray, &mut PrismHit) -> bool;
 type Occluded = fn(&Asked<'_>, &Ray) -> bool;
-
-/// The box of a block: see [`block::outline`].
-pub type Outline = fn(&DisplacedSurface, &Record, Block, Option<(f32, f32)>) -> Aabb;
 
 /// The chosen hit tests.
 #[derive(Clone, Copy)]

@@ -22,6 +22,7 @@ mod march;
 mod motion;
 mod path;
 mod ray_frame;
+mod room;
 #[cfg(test)]
 mod seam_tests;
 mod sides;
@@ -41,17 +42,18 @@ use crate::ray::{Aabb, Ray, RayPacket, lanes_of};
 use crate::surface::{
     ChartEdges, ClosestPoint, Corners, DisplacedSurface, PointQuery, Seams, SurfacePoint, TexelBox,
 };
-use exact::{Asked, ExactPrisms, hull};
+use exact::{Asked, ExactPrisms};
 use kernel::Kernel;
 use uniform::UniformPrisms;
 
 pub use detail::Lod;
-pub use edits::{BoundsChange, EditBounds};
+pub use edits::BoundsChange;
 pub use explain::{
     BlockTold, CellFate, CellTold, Explanation, Fate, LeafTold, PartTold, PathPoint,
 };
 pub use march::{March, MarchError, Step};
 pub use motion::MovingPrisms;
+pub use room::EditBounds;
 pub use simd::SimdLevel;
 pub use steps::count_steps;
 
@@ -163,7 +165,9 @@ impl Prisms {
         let march = march.validate()?;
         let room = edit_bounds.room(surface.map());
         let parts = match march {
-            March::Exact => Parts::Exact(ExactPrisms::new(&surface, edit_bounds)?),
+            March::Exact => {
+                Parts::Exact(ExactPrisms::new(&surface, edit_bounds, kernel::outline())?)
+            }
             March::Uniform { .. } if surface.seams() == Seams::Closed => {
                 return Err(MarchError::SeamsNeedExact);
             }
@@ -251,7 +255,7 @@ impl Prisms {
             Parts::Exact(exact) => exact.bounds(primitive),
             Parts::Uniform(uniform) => {
                 let offsets = uniform.records[primitive as usize].offsets();
-                hull(&self.surface.patch(primitive), [0, 1, 2], offsets)
+                self.surface.patch(primitive).hull([0, 1, 2], offsets)
             }
         };
         bounds.padded(BOUNDS_ULPS)

@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
-use super::edits::EditBounds;
 use super::frame::Prism;
 use super::march::polish::{Root, polish};
 use super::march::uniform::{Field, Stepping};
 use super::march::{March, bent};
 use super::path::{HeightUnits, Path};
+use super::room::EditBounds;
 use super::sides::inside;
 use super::simd::{Grid, Lanes};
 use super::touch::{TouchIndex, around};

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{DisplacementMap, HeightSample};
+use crate::ray::Aabb;
 
 /// S(b) over one base triangle, and its derivatives.
 #[derive(Clone, Copy, Debug)]
@@ -118,6 +119,27 @@ impl Patch<'_> {
 
     /// Where opposed normals cancel to less than this, the surface is cut off.
     pub const LEAST_NORMAL: f64 = 1e-3;
+
+    /// Conservative bounds of S between some corners, for a range of w: every point is sum b_i (v_i + w n_i) for one w of the range, so it
+    /// is in the hull of these; and no further than the largest |D| from the triangle.
+    pub(crate) fn hull<const N: usize>(&self, corners: [usize; N], offsets: [f32; 2]) -> Aabb {
+        let offsets = offsets.map(f64::from);
+        let (mut hull_min, mut hull_max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for corner in corners {
+            let (v, n) = (self.vertices[corner], self.normals[corner]);
+            (min, max) = (min.min(v), max.max(v));
+            for w in offsets {
+                (hull_min, hull_max) = (hull_min.min(v + w * n), hull_max.max(v + w * n));
+            }
+        }
+        // w |N'| = D and |N'| <= 1.
+        let reach = offsets[0].abs().max(offsets[1].abs());
+        Aabb {
+            min: hull_min.max(min - reach).as_vec3(),
+            max: hull_max.min(max + reach).as_vec3(),
+        }
+    }
 
     /// The exact inverse of P(b) + w N'(b) = x near a guess, by Newton's method: (u, v, w), or `None` where it does
     /// not converge.

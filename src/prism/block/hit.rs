@@ -2,13 +2,13 @@
 
 mod explain;
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::cell::{Once, Verdict, judged};
 use super::cull::met;
 use super::leaf::{Leaf, Rows};
 use super::middle::Heights;
-use super::newton::{Cell, Whose, in_triangle, land};
+use super::newton::{Cell, Crossing, Whose, in_triangle, land};
 use super::place::{PART, PARTS, Place, leaf_of, leaves_of};
 use super::view::View;
 use super::{Block, LEAF, Record};
@@ -30,25 +30,6 @@ pub struct Ask<'a> {
     pub corners: Option<Corners>,
     /// Whether any crossing will do.
     pub any: bool,
-}
-
-/// A crossing, and dS/du x dS/dv where that is known already.
-#[derive(Clone, Copy, Debug)]
-pub struct Crossing {
-    pub at: Found,
-    pub ng: Option<DVec3>,
-}
-
-impl Crossing {
-    /// One of which no one asks where it is.
-    const ANY: Self = Self {
-        at: Found {
-            t: 0.0,
-            u: 0.0,
-            v: 0.0,
-        },
-        ng: None,
-    };
 }
 
 /// The nearest crossing of S in a block with t in the ray's interval, or any.

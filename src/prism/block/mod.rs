@@ -23,13 +23,16 @@ mod place;
 mod record;
 #[cfg(test)]
 mod tests;
+mod told;
 mod view;
 
 pub use cut::Cutter;
-pub use hit::{Ask, Crossing, nearest, told};
+pub use hit::{Ask, nearest, told};
 pub use middle::Heights;
-pub use outline::outline;
+pub use newton::Crossing;
+pub use outline::{Outline, outline};
 pub use record::{Block, Record};
+pub use told::{BlockTold, CellFate, CellTold, Fate, LeafTold, PartTold};
 
 /// Cells across and up of a leaf: a register of the map's finest entries.
 pub const LEAF: [u32; 2] = [8, 4];

@@ -8,10 +8,28 @@
 use glam::{DVec2, DVec3, Vec2};
 
 use super::cell::Once;
-use super::hit::Crossing;
 use crate::prism::judge::Found;
 use crate::prism::ray_frame::RayFrame;
 use crate::surface::{HeightSample, Patch};
+
+/// A crossing, and dS/du x dS/dv where that is known already.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    pub at: Found,
+    pub ng: Option<DVec3>,
+}
+
+impl Crossing {
+    /// One of which no one asks where it is.
+    pub const ANY: Self = Self {
+        at: Found {
+            t: 0.0,
+            u: 0.0,
+            v: 0.0,
+        },
+        ng: None,
+    };
+}
 
 /// A texel cell in f64.
 pub struct Cell {

@@ -6,10 +6,12 @@ use super::middle::{Axis, Heights, Middle};
 use super::place::{PARTS, Place, leaves_of};
 use super::view::rounding;
 use super::{Block, LEAF, Record};
-use crate::prism::exact::hull;
 use crate::prism::simd::{LANES, Lanes};
 use crate::ray::Aabb;
 use crate::surface::DisplacedSurface;
+
+/// [`outline`] for one instruction set.
+pub type Outline = fn(&DisplacedSurface, &Record, Block, Option<(f32, f32)>) -> Aabb;
 
 /// Holds S over a block, for the map as it is and for heights of `room`; empty where no leaf reaches the triangle.
 #[inline(always)]
@@ -23,7 +25,9 @@ pub fn outline<L: Lanes>(
     let place = Place::new(surface.map(), record, block);
     let middle = Middle::new::<L>(record, block, &heights);
     if !middle.is_tame() {
-        return hull(&surface.patch(block.triangle), [0, 1, 2], record.offsets());
+        return surface
+            .patch(block.triangle)
+            .hull([0, 1, 2], record.offsets());
     }
     let axes = [
         middle.axis(record.along(0)),

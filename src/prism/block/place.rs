@@ -8,7 +8,7 @@ use super::middle::Middle;
 use super::{Block, LEAF, Record, SIDE};
 use crate::prism::judge::Cells;
 use crate::prism::simd::{LANES, Lanes};
-use crate::surface::{DisplacementMap, StoredTexels, Wrap};
+use crate::surface::{DisplacementMap, StoredTexels, TexelBox, Wrap};
 
 /// Where a block's cells are in the map.
 pub struct Place<'m> {
@@ -149,6 +149,17 @@ impl<'m> Place<'m> {
             (ranges[0][lane], ranges[1][lane]) = (low * unit, high * unit);
         }
         [L::from_array(ranges[0]), L::from_array(ranges[1])]
+    }
+}
+
+impl Block {
+    /// Where it is, in the patch's texel coordinates.
+    pub fn texels(self, map: &DisplacementMap, record: &Record) -> TexelBox {
+        let Cells { x, y } = Place::new(map, record, self).all();
+        TexelBox {
+            low: DVec2::new(x[0] as f64, y[0] as f64),
+            high: DVec2::new(x[1] as f64 + 1.0, y[1] as f64 + 1.0),
+        }
     }
 }
 

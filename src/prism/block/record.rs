@@ -4,10 +4,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DVec2, DVec3};
 
-use super::place::Place;
-use crate::prism::judge::Cells;
 use crate::prism::simd::LANES;
-use crate::surface::{DisplacementMap, Patch, TexelBox};
+use crate::surface::Patch;
 
 /// Words by axis of [`Record::vectors`].
 pub const WORDS: usize = 6;
@@ -171,15 +169,4 @@ pub struct Block {
     pub triangle: u32,
     /// Its first cell, from the triangle's corner.
     pub place: [u16; 2],
-}
-
-impl Block {
-    /// Where it is, in the patch's texel coordinates.
-    pub fn texels(self, map: &DisplacementMap, record: &Record) -> TexelBox {
-        let Cells { x, y } = Place::new(map, record, self).all();
-        TexelBox {
-            low: DVec2::new(x[0] as f64, y[0] as f64),
-            high: DVec2::new(x[1] as f64 + 1.0, y[1] as f64 + 1.0),
-        }
-    }
 }

@@ -3,11 +3,11 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use crate::prism::{March, MovingPrisms, PrismOptions, Step};
+use crate::prism::{EditBounds, March, MovingPrisms, PrismOptions, Step};
 use crate::ray::Aabb;
 use crate::surface::{
-    DisplacedSurface, Displacement, MeshBuilder, MovingSurface, NormalMode, Seams, TexelBox,
-    Texels, TimeStep, UvTransform, Wrap,
+    DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, MovingSurface, NormalMode, Seams,
+    TexelBox, Texels, TimeStep, UvTransform, Wrap,
 };
 
 const MARCHES: [March; 2] = [

@@ -6,6 +6,7 @@ use glam::{Vec2, vec3};
 
 use super::*;
 use crate::prism::March;
+use crate::prism::kernel::outline;
 use crate::surface::{Displacement, MeshBuilder, NormalMode, Seams, Texels, UvTransform, Wrap};
 
 /// Numbers in [0, 1).
@@ -205,8 +206,10 @@ fn a_triangle_of_normals_that_turn_by_much_is_one_primitive() {
 #[test]
 fn more_primitives_than_can_be_numbered_are_an_error() {
     let surface = sheet(Wrap::Repeat, 1.7);
-    let made = |max| ExactPrisms::limited(&surface, EditBounds::Tight, max);
-    let count = ExactPrisms::new(&surface, EditBounds::Tight).unwrap().len();
+    let made = |max| ExactPrisms::limited(&surface, EditBounds::Tight, outline(), max);
+    let count = ExactPrisms::new(&surface, EditBounds::Tight, outline())
+        .unwrap()
+        .len();
     assert_eq!(made(count).map(|made| made.len()), Ok(count));
     for max in [0, 1, count - 1] {
         assert_eq!(made(max).err(), Some(MarchError::TooManyPrimitives { max }));
