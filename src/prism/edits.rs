@@ -13,7 +13,7 @@ use crate::surface::TexelRect;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BoundsChange {
     /// Prisms that have texels of the edit under them; 0 where no edit within the map's range can matter
-    /// ([`EditBounds::Range`]).
+    /// ([`EditBounds::Range`](super::EditBounds::Range)).
     pub touched: usize,
     /// Primitives whose [`Prisms::bounds`] have grown, in ascending order.
     pub primitives: Vec<u32>,
@@ -35,7 +35,7 @@ pub(super) struct Growth {
 }
 
 impl Prisms {
-    /// Takes note of an edit of the map's texels in `rect` ([`DisplacementMap::update`]); before the next ray, or that
+    /// Takes note of an edit of the map's texels in `rect` ([`DisplacementMap::update`](crate::surface::DisplacementMap::update)); before the next ray, or that
     /// may miss what has grown. Prisms that do not hold the new heights are widened in place; those that do stay as they
     /// are, even if less would do by now.
     ///
