@@ -227,12 +227,29 @@ static inline void occluded_groups(const struct RTCOccludedFunctionNArguments *a
   }
 }
 
+/* One ray whose hits nothing filters: where it lies. */
+static inline void intersect_alone(const struct RTCIntersectFunctionNArguments *args) {
+  const struct pm_geometry *g = args->geometryUserPtr;
+  struct RTCRayHit *ray = (struct RTCRayHit *)args->rayhit;
+  pm_hit at;
+  const bool found = g->test.intersect(g->test_user, args->primID, (const pm_ray *)&ray->ray, &at) &&
+                     at.t > ray->ray.tnear && at.t < ray->ray.tfar;
+  if (found) {
+    ray->ray.tfar = at.t;
+    fill_hit(&ray->hit, &at, args->geomID, args->context);
+  }
+  report(args->valid, found);
+}
+
 /* A constant N lets the compiler drop the strides for single rays and packets of 8. */
 static void on_intersect(const struct RTCIntersectFunctionNArguments *args) {
   const struct pm_geometry *g = args->geometryUserPtr;
-  if (args->N == 1)
+  const bool is_filtered = has_filter(g, args->context);
+  if (args->N == 1 && !is_filtered && args->valid[0] == -1)
+    intersect_alone(args);
+  else if (args->N == 1)
     intersect_lanes(args, 1);
-  else if (!g->test.intersect8 || has_filter(g, args->context))
+  else if (!g->test.intersect8 || is_filtered)
     intersect_lanes(args, args->N);
   else if (args->N == PM_LANES)
     intersect_groups(args, PM_LANES);

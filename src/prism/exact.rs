@@ -472,23 +472,30 @@ impl<L: Lanes> Task<L> for Hit<'_, '_> {
 
     #[inline(always)]
     fn run(self) -> PrismHit {
-        hit(
-            &self.asked.patch(self.triangle),
-            self.triangle,
-            &self.crossing,
-        )
+        let Self {
+            asked,
+            triangle,
+            crossing,
+        } = self;
+        // Most crossings come with their normals.
+        match crossing.root().map(|root| root.to_hit(triangle)) {
+            Some(hit) if hit.ng != Vec3::ZERO => hit,
+            _ => hit(&asked.patch(triangle), triangle, &crossing),
+        }
     }
 }
 
 /// The hit on S at a crossing.
 #[inline(always)]
 pub fn hit(patch: &Patch<'_>, triangle: u32, crossing: &Crossing) -> PrismHit {
-    let Crossing {
-        at: Found { t, u, v },
-        ng,
-    } = *crossing;
-    let ng = ng.unwrap_or_else(|| patch.point(u, v).ng);
-    let mut hit = Root { t, u, v, ng }.to_hit(triangle);
+    let Found { t, u, v } = crossing.at;
+    let root = crossing.root().unwrap_or_else(|| Root {
+        t,
+        u,
+        v,
+        ng: patch.point(u, v).ng,
+    });
+    let mut hit = root.to_hit(triangle);
     if hit.ng == Vec3::ZERO {
         hit.ng = normal_without_surface(patch);
     }

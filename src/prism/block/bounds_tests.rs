@@ -108,7 +108,7 @@ fn inverse_lengths_are_near_their_series() {
             leaf,
             ..
         } = sight;
-        let middle = &view.middle;
+        let middle = view.middle;
         let corner = case.record.corner();
         for _ in 0..60 {
             let [s, t] = [0, 1].map(|k: usize| {
@@ -270,10 +270,10 @@ fn parts_and_boxes_hold_the_surface() {
             ..
         } = sight;
         let bounds = outline::<Portable>(&case.surface, &case.record, *block, None);
-        let all = place.parts::<Portable>(&view.middle);
+        let all = place.parts::<Portable>(view.middle);
         let two = random.of(&[[0, 1], [2, 3], [4, 5], [6, 7], [5, 0]]);
         let places = leaves_of(two);
-        let some = place.leaves::<Portable>(two, &view.middle);
+        let some = place.leaves::<Portable>(two, view.middle);
         for (parts, places, size) in [(&all, &PARTS, PART), (&some, &places, LEAF)] {
             let there = place.there(places, size);
             let intervals = seen(view, &sight.heights, parts);
@@ -317,7 +317,7 @@ fn parts_and_boxes_hold_the_surface() {
     assert!(boxes >= 1_000_000, "{boxes}");
 }
 
-fn seen(view: &View, heights: &Heights, parts: &Parts<Portable>) -> [[[f32; LANES]; 2]; 3] {
+fn seen(view: &View<'_>, heights: &Heights, parts: &Parts<Portable>) -> [[[f32; LANES]; 2]; 3] {
     let offsets = Offsets::new(parts, heights, &view.middle.k, view.middle.k_off);
     [
         (&view.x, view.noise),

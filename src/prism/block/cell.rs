@@ -73,7 +73,7 @@ const T: Vec4 = Vec4::new(0.0, 0.0, 1.0, 1.0);
 /// Cell (i, j) of a leaf, whose texels are `stored`, in the order of the outline.
 #[inline(always)]
 pub fn judged(
-    view: &View,
+    view: &View<'_>,
     heights: &Heights,
     leaf: &Leaf,
     (i, j): (u32, u32),
@@ -83,6 +83,26 @@ pub fn judged(
     let (s, t) = (S + (i as f32 - 4.0), T + (j as f32 - 2.0));
     let k = leaf.k(s, t);
     let (s, t) = (s + leaf.s, t + leaf.t);
+
+    let d = Vec4::from_array(stored) * heights.scale + heights.offset;
+    let w = d * k;
+    let along = |axis: &super::middle::Axis| {
+        let p = axis.p.c + s * axis.p.s + t * axis.p.t;
+        let n = axis.n.c + s * axis.n.s + t * axis.n.t;
+        p + w * n
+    };
+    let rise = d.max_element() - d.min_element();
+    let beta = leaf.beta(rise, heights.most);
+    let seen = Seen {
+        x: along(&view.x),
+        y: along(&view.y),
+        off: leaf.off + 0.5 * view.shear * beta,
+        bend: 4.0 * view.shear * beta + 2.0 * leaf.off,
+    };
+    let roots = seen.roots();
+    if roots == Roots::None {
+        return Verdict::Missed;
+    }
 
     let b1 = view.middle.b[0].c + s * view.middle.b[0].s + t * view.middle.b[0].t;
     let b2 = view.middle.b[1].c + s * view.middle.b[1].s + t * view.middle.b[1].t;
@@ -94,15 +114,6 @@ pub fn judged(
         return Verdict::Missed;
     }
 
-    let d = Vec4::from_array(stored) * heights.scale + heights.offset;
-    let w = d * k;
-    let along = |axis: &super::middle::Axis| {
-        let p = axis.p.c + s * axis.p.s + t * axis.p.t;
-        let n = axis.n.c + s * axis.n.s + t * axis.n.t;
-        p + w * n
-    };
-    let rise = d.max_element() - d.min_element();
-    let beta = leaf.beta(rise, heights.most);
     let z = along(&view.z);
     let depth_off = leaf.depth_off + 0.5 * view.per_length * beta;
     let (near, far) = (z.min_element() - depth_off, z.max_element() + depth_off);
@@ -110,13 +121,7 @@ pub fn judged(
         return Verdict::Missed;
     }
 
-    let seen = Seen {
-        x: along(&view.x),
-        y: along(&view.y),
-        off: leaf.off + 0.5 * view.shear * beta,
-        bend: 4.0 * view.shear * beta + 2.0 * leaf.off,
-    };
-    match seen.roots() {
+    match roots {
         Roots::None => Verdict::Missed,
         Roots::One => {
             let least = b0.min(b1).min(b2).min_element();

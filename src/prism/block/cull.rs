@@ -76,7 +76,7 @@ pub fn above<L: Lanes>(x: L) -> u32 {
 
 /// The parts that the ray may meet, and the ray parameter before which it does not.
 #[inline(always)]
-pub fn met<L: Lanes>(view: &View, heights: &Heights, parts: &Parts<L>) -> (u32, L) {
+pub fn met<L: Lanes>(view: &View<'_>, heights: &Heights, parts: &Parts<L>) -> (u32, L) {
     let offsets = Offsets::new(parts, heights, &view.middle.k, view.middle.k_off);
     let [x, off_x] = offsets.along(parts, &view.x, view.noise);
     let [y, off_y] = offsets.along(parts, &view.y, view.noise);

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::cell::{Once, Verdict, judged};
 use super::cull::met;
 use super::leaf::{Leaf, Rows};
-use super::middle::Heights;
+use super::middle::{Heights, Middle};
 use super::newton::{Cell, Crossing, Whose, in_triangle, land};
 use super::place::{PART, PARTS, Place, leaf_of, leaves_of};
 use super::view::View;
@@ -44,7 +44,8 @@ pub fn nearest<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> Option<Crossing> {
         interval: [ray.tnear, ray.tfar],
         nearest: None,
     };
-    let mut view = View::new::<L>(ask.record, &heights, ask.block, &frame, ray);
+    let middle = Middle::new::<L>(ask.record, ask.block, &heights);
+    let mut view = View::new::<L>(ask.record, &middle, &frame, ray);
     if !view.is_sound {
         search.decide::<L>(place.all());
         return search.nearest;
@@ -76,14 +77,14 @@ const MOST_GROUPS: usize = PARTS.len() / 2;
 impl Leaves {
     /// First the parts of the map's second level are held against the ray, then their leaves.
     #[inline(always)]
-    fn new<L: Lanes>(place: &Place<'_>, view: &View, heights: &Heights) -> Self {
+    fn new<L: Lanes>(place: &Place<'_>, view: &View<'_>, heights: &Heights) -> Self {
         let mut leaves = Self {
             begins: [[0.0; LANES]; MOST_GROUPS],
             range: [[[0.0; LANES]; MOST_GROUPS]; 2],
             parts: [[0; 2]; MOST_GROUPS],
             waiting: 0,
         };
-        let (bits, _) = met(view, heights, &place.parts::<L>(&view.middle));
+        let (bits, _) = met(view, heights, &place.parts::<L>(view.middle));
         let mut parts = bits & place.there(&PARTS, PART);
         for group in 0..MOST_GROUPS {
             if parts == 0 {
@@ -97,7 +98,7 @@ impl Leaves {
                 (parts.trailing_zeros(), 0xff)
             };
             parts &= parts.wrapping_sub(1);
-            let eight = place.leaves::<L>([one, other], &view.middle);
+            let eight = place.leaves::<L>([one, other], view.middle);
             let (bits, begins) = met(view, heights, &eight);
             let bits = bits & used & place.there(&leaves_of([one, other]), LEAF);
             leaves.begins[group] = begins.to_array();
@@ -171,14 +172,14 @@ impl<'a> Search<'a> {
     #[inline(always)]
     fn leaf<L: Lanes>(
         &mut self,
-        view: &mut View,
+        view: &mut View<'_>,
         place: &Place<'_>,
         leaf: [u32; 2],
         rise: f32,
     ) -> bool {
         let ask = self.ask;
         let [i, j] = [leaf[0] * LEAF[0], leaf[1] * LEAF[1]];
-        let [s, t] = place.middle_of(&view.middle, [i, j], LEAF);
+        let [s, t] = place.middle_of(view.middle, [i, j], LEAF);
         let Some(leaf) = Leaf::new(view, &ask.heights, s, t) else {
             self.decide::<L>(place.part(i, j));
             return self.ask.any && self.nearest.is_some();
@@ -195,7 +196,7 @@ impl<'a> Search<'a> {
     #[inline(always)]
     fn cells<L: Lanes>(
         &mut self,
-        view: &mut View,
+        view: &mut View<'_>,
         place: &Place<'_>,
         leaf: &Leaf,
         rise: f32,

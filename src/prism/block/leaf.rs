@@ -37,8 +37,8 @@ pub struct Leaf {
 impl Leaf {
     /// As the ray sees it; `None` where the normal turns too much for the series.
     #[inline(always)]
-    pub fn new(view: &View, heights: &Heights, s: f32, t: f32) -> Option<Self> {
-        let leaf = Self::over(&view.middle, heights, s, t)?;
+    pub fn new(view: &View<'_>, heights: &Heights, s: f32, t: f32) -> Option<Self> {
+        let leaf = Self::over(view.middle, heights, s, t)?;
         Some(Self {
             off: view.noise + view.shear * leaf.off,
             depth_off: view.depth_noise + view.per_length * leaf.off,
@@ -96,7 +96,7 @@ impl Leaf {
     #[inline(always)]
     pub fn cells<L: Lanes>(
         &self,
-        view: &View,
+        view: &View<'_>,
         heights: &Heights,
         rise: f32,
         rows: &impl Rows,

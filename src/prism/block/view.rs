@@ -8,21 +8,21 @@
 //! Texel coordinates (s, t) are from the block's middle, ray parameters from there as well. The ray's way to the block is in
 //! f64, so that what rounding leaves depends on the block's size and not on the distance.
 
-use super::middle::{Axis, Heights, Middle};
-use super::{Block, ROUNDING, Record};
+use super::middle::{Axis, Middle};
+use super::{ROUNDING, Record};
 use crate::prism::ray_frame::RayFrame;
 use crate::prism::simd::Lanes;
 use crate::ray::Ray;
 
 /// See the module.
-pub struct View {
+pub struct View<'m> {
     /// Lateral axes.
     pub x: Axis,
     pub y: Axis,
     /// Ray parameter.
     pub z: Axis,
     /// In space.
-    pub middle: Middle,
+    pub middle: &'m Middle,
     /// By how much roundings may move a point sideways, and along the ray.
     pub noise: f32,
     pub depth_noise: f32,
@@ -50,17 +50,10 @@ const LARGEST: f32 = 1e15;
 /// Below this products of the sides of texels would lose digits, or vanish.
 const SMALLEST: f32 = 1e-12;
 
-impl View {
+impl<'m> View<'m> {
     /// Of use where [`is_sound`](Self::is_sound).
     #[inline(always)]
-    pub fn new<L: Lanes>(
-        record: &Record,
-        heights: &Heights,
-        block: Block,
-        frame: &RayFrame,
-        ray: &Ray,
-    ) -> Self {
-        let middle = Middle::new::<L>(record, block, heights);
+    pub fn new<L: Lanes>(record: &Record, middle: &'m Middle, frame: &RayFrame, ray: &Ray) -> Self {
         let [ds, dt] = middle.from();
         let [ax, ay, az] = frame.axes;
         let (wx, wy, wz) = (record.along(ax), record.along(ay), record.along(az));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Quat, Vec2, Vec3};
 
 use crate::prism::block::leaf::Leaf;
-use crate::prism::block::middle::Heights;
+use crate::prism::block::middle::{Heights, Middle};
 use crate::prism::block::place::Place;
 use crate::prism::block::tests::Random;
 use crate::prism::block::view::View;
@@ -234,7 +234,7 @@ pub struct Eye {
 }
 
 impl Eye {
-    fn new(frame: RayFrame, view: &View, truth: &Truth<'_>) -> Self {
+    fn new(frame: RayFrame, view: &View<'_>, truth: &Truth<'_>) -> Self {
         let mut eye = Self {
             frame,
             turn: DVec2::X,
@@ -315,7 +315,7 @@ pub struct Sight<'a> {
     pub at: [u32; 2],
     pub leaf: Leaf,
     pub ray: Ray,
-    pub view: View,
+    pub view: View<'a>,
     pub eye: Eye,
 }
 
@@ -375,7 +375,8 @@ pub fn leaves_on(
         let ray = case.ray(random, if exact { texel.round() } else { texel });
         let frame = RayFrame::new(&ray, axes(&ray));
         let place = case.place(block);
-        let view = View::new::<Portable>(&case.record, &heights, block, &frame, &ray);
+        let middle = Middle::new::<Portable>(&case.record, block, &heights);
+        let view = View::new::<Portable>(&case.record, &middle, &frame, &ray);
         if !view.is_sound {
             continue;
         }
@@ -384,7 +385,7 @@ pub fn leaves_on(
             let n = (cell[k] as i64 - place.first[k]) as u32;
             n / LEAF[k] * LEAF[k]
         });
-        let [s, t] = place.middle_of(&view.middle, at, LEAF);
+        let [s, t] = place.middle_of(view.middle, at, LEAF);
         let Some(leaf) = Leaf::new(&view, &heights, s, t) else {
             continue;
         };

@@ -7,7 +7,7 @@ use crate::prism::block::LEAF;
 use crate::prism::block::cell::{Verdict, judged};
 use crate::prism::block::cull::met;
 use crate::prism::block::leaf::{Leaf, Rows};
-use crate::prism::block::middle::{Axis, Heights};
+use crate::prism::block::middle::{Axis, Heights, Middle};
 use crate::prism::block::place::{PART, PARTS, Place};
 use crate::prism::block::told::{BlockTold, CellFate, CellTold, Fate, LeafTold, PartTold};
 use crate::prism::block::view::View;
@@ -34,14 +34,15 @@ pub fn told<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> (BlockTold, Option<Found>) {
         parts: Vec::new(),
         leaves: Vec::new(),
     };
-    let mut view = View::new::<L>(ask.record, &heights, ask.block, &frame, ray);
+    let middle = Middle::new::<L>(ask.record, ask.block, &heights);
+    let mut view = View::new::<L>(ask.record, &middle, &frame, ray);
     if !view.is_sound {
         search.decide::<L>(place.all());
         told.fate = Fate::Judged;
         return (told, search.nearest.map(|crossing| crossing.at));
     }
 
-    let parts = place.parts::<L>(&view.middle);
+    let parts = place.parts::<L>(view.middle);
     let (bits, _) = met(&view, &heights, &parts);
     let ranges = parts.range.map(L::to_array);
     let are_there = place.there(&PARTS, PART);
@@ -99,7 +100,7 @@ fn texels(Cells { x, y }: Cells) -> [DVec2; 2] {
 
 /// A leaf as the ray sees it; untouched where the judge has it.
 fn seen<L: Lanes>(
-    view: &View,
+    view: &View<'_>,
     heights: &Heights,
     place: &Place<'_>,
     at: [u32; 2],
@@ -107,7 +108,7 @@ fn seen<L: Lanes>(
     told: &mut LeafTold,
 ) {
     let [i, j] = [at[0] * LEAF[0], at[1] * LEAF[1]];
-    let [s, t] = place.middle_of(&view.middle, [i, j], LEAF);
+    let [s, t] = place.middle_of(view.middle, [i, j], LEAF);
     let Some(leaf) = Leaf::new(view, heights, s, t) else {
         return;
     };
@@ -142,7 +143,7 @@ fn seen<L: Lanes>(
 }
 
 /// Where a displaced texel of a leaf is seen.
-fn vertex(view: &View, heights: &Heights, leaf: &Leaf, [i, j]: [u32; 2], stored: f32) -> DVec2 {
+fn vertex(view: &View<'_>, heights: &Heights, leaf: &Leaf, [i, j]: [u32; 2], stored: f32) -> DVec2 {
     let [s, t] = [i as f32 - 4.0, j as f32 - 2.0];
     let k = leaf.k(Vec4::splat(s), Vec4::splat(t)).x;
     let w = (stored * heights.scale + heights.offset) * k;
