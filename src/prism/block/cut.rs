@@ -56,7 +56,7 @@ impl Cutter {
         let fits = (FEWEST_TEXELS..=MOST_TEXELS).contains(&longest)
             && low.abs().max(high.abs()).max_element() <= MOST_TEXELS * 2.0
             && height >= THINNEST * longest
-            && size.element_product() / f64::from(SIDE * SIDE) <= MOST_BLOCKS
+            && self.count(size) <= MOST_BLOCKS
             && turn(patch, (size + 4.0).min(DVec2::splat(SIDE.into()))) <= MOST_TURN;
         if !fits {
             return Err(Whole);
@@ -75,6 +75,16 @@ impl Cutter {
             }
         }
         Ok(Record::new(patch, corner, offsets))
+    }
+
+    /// About how many blocks cover a rectangle of texels: every period of the map is cut anew.
+    fn count(&self, size: DVec2) -> f64 {
+        let unit = i64::from(SIDE);
+        let along = |axis: usize| {
+            let n = self.size[axis];
+            size[axis] * ((n + unit - 1) / unit) as f64 / n as f64
+        };
+        along(0) * along(1)
     }
 
     /// The intervals of cells that blocks take up along an axis, [from, to).

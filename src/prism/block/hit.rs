@@ -41,8 +41,10 @@ pub fn nearest<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> Option<Crossing> {
     let mut search = Search {
         ask,
         frame: &frame,
+        place: &place,
         interval: [ray.tnear, ray.tfar],
         nearest: None,
+        asked: 0,
     };
     let middle = Middle::new::<L>(ask.record, ask.block, &heights);
     let mut view = View::new::<L>(ask.record, &middle, &frame, ray);
@@ -154,10 +156,17 @@ impl Leaves {
 struct Search<'a> {
     ask: &'a Ask<'a>,
     frame: &'a RayFrame,
+    place: &'a Place<'a>,
     /// Of ray parameters, open; ends at the nearest crossing so far.
     interval: [f32; 2],
     nearest: Option<Crossing>,
+    /// Cells that the judge has been asked about.
+    asked: u32,
 }
+
+/// Cells of a block that the judge is asked about one by one. Where there are more, the surface is folded over and over, and the judge decides the rest of
+/// the block at once.
+const MOST_ASKED: u32 = 8;
 
 impl<'a> Search<'a> {
     fn patch(&self) -> Patch<'a> {
@@ -229,7 +238,7 @@ impl<'a> Search<'a> {
                         stored,
                     });
                     view.end_at(self.interval[1]);
-                    if self.ask.any && self.nearest.is_some() {
+                    if self.asked > MOST_ASKED || self.ask.any && self.nearest.is_some() {
                         return true;
                     }
                 }
@@ -312,10 +321,16 @@ impl<L: Lanes> Task<L> for Look<'_, '_> {
         if is_settled {
             return;
         }
-        let one = |k: usize| [cell[k]; 2];
-        search.decide::<L>(Cells {
-            x: one(0),
-            y: one(1),
-        });
+        search.asked += 1;
+        let cells = if search.asked > MOST_ASKED {
+            search.place.all()
+        } else {
+            let one = |k: usize| [cell[k]; 2];
+            Cells {
+                x: one(0),
+                y: one(1),
+            }
+        };
+        search.decide::<L>(cells);
     }
 }

@@ -203,6 +203,32 @@ fn a_triangle_of_normals_that_turn_by_much_is_one_primitive() {
     }
 }
 
+/// A triangle, 3000 texels across, over maps of a few texels.
+#[test]
+fn small_maps_that_repeat_without_end_take_no_memory() {
+    for (width, height) in [(1, 1), (2, 3), (1, 64), (33, 1)] {
+        let repeats = Vec2::new(3000.0 / width as f32, 3000.0 / height as f32);
+        let builder = MeshBuilder {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: vec![Vec3::Z; 3],
+            texcoords: vec![Vec2::ZERO, repeats * Vec2::X, repeats * Vec2::Y],
+            triangles: vec![[0, 1, 2]],
+        };
+        let (mesh, _) = builder.build(NormalMode::File).unwrap();
+        let texels = Texels::U8((0..width * height).map(|k| k as u8).collect());
+        let map = DisplacementMap::new(width, height, texels, Wrap::Repeat).unwrap();
+        let surface = DisplacedSurface::new(Arc::new(mesh), Arc::new(map), Displacement::new(0.1));
+        let prisms = Prisms::new(Arc::new(surface.unwrap()), March::Exact).unwrap();
+        assert!(prisms.len() <= 65_536, "{width} {height}: {}", prisms.len());
+        let ray = Ray::new(vec3(0.3, 0.3, 1.0), Vec3::NEG_Z);
+        let all = 0..prisms.len() as u32;
+        assert!(
+            all.map(|p| prisms.intersect(p, &ray))
+                .any(|hit| hit.is_some())
+        );
+    }
+}
+
 #[test]
 fn more_primitives_than_can_be_numbered_are_an_error() {
     let surface = sheet(Wrap::Repeat, 1.7);

@@ -25,8 +25,10 @@ pub fn told<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> (BlockTold, Option<Found>) {
     let mut search = Search {
         ask,
         frame: &frame,
+        place: &place,
         interval: [ray.tnear, ray.tfar],
         nearest: None,
+        asked: 0,
     };
     let mut told = BlockTold {
         texels: texels(place.all()),
@@ -76,14 +78,17 @@ pub fn told<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> (BlockTold, Option<Found>) {
             told.leaves.push(LeafTold::unseen(part));
         }
     }
+    let mut is_settled = false;
     while let Some(leaf) = leaves.first() {
         let mut leaf_told = LeafTold::unseen(part_told(&leaves, leaf, Fate::Behind));
-        if leaves.begin(leaf) <= view.interval[1] {
+        if is_settled {
+            leaf_told.part.fate = Fate::Judged;
+        } else if leaves.begin(leaf) <= view.interval[1] {
             let at = leaves.place(leaf);
             let rise = leaves.rise(leaf) * heights.scale.abs();
             leaf_told.part.fate = Fate::Judged;
             seen::<L>(&view, &heights, &place, at, rise, &mut leaf_told);
-            search.leaf::<L>(&mut view, &place, at, rise);
+            is_settled = search.leaf::<L>(&mut view, &place, at, rise);
         }
         told.leaves.push(leaf_told);
     }
