@@ -58,7 +58,7 @@ pub fn nearest<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> Option<Crossing> {
             break;
         }
         let rise = leaves.rise(leaf) * heights.scale.abs();
-        if search.leaf::<L>(&mut view, &place, leaves.place(leaf), rise) {
+        if search.leaf::<L>(&mut view, leaves.place(leaf), rise) {
             break;
         }
     }
@@ -179,14 +179,8 @@ impl<'a> Search<'a> {
 
     /// Looks at a leaf's cells; whether nothing more is wanted.
     #[inline(always)]
-    fn leaf<L: Lanes>(
-        &mut self,
-        view: &mut View<'_>,
-        place: &Place<'_>,
-        leaf: [u32; 2],
-        rise: f32,
-    ) -> bool {
-        let ask = self.ask;
+    fn leaf<L: Lanes>(&mut self, view: &mut View<'_>, leaf: [u32; 2], rise: f32) -> bool {
+        let (ask, place) = (self.ask, self.place);
         let [i, j] = [leaf[0] * LEAF[0], leaf[1] * LEAF[1]];
         let [s, t] = place.middle_of(view.middle, [i, j], LEAF);
         let Some(leaf) = Leaf::new(view, &ask.heights, s, t) else {

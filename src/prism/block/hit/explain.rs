@@ -88,7 +88,7 @@ pub fn told<L: Lanes>(ask: &Ask<'_>, ray: &Ray) -> (BlockTold, Option<Found>) {
             let rise = leaves.rise(leaf) * heights.scale.abs();
             leaf_told.part.fate = Fate::Judged;
             seen::<L>(&view, &heights, &place, at, rise, &mut leaf_told);
-            is_settled = search.leaf::<L>(&mut view, &place, at, rise);
+            is_settled = search.leaf::<L>(&mut view, at, rise);
         }
         told.leaves.push(leaf_told);
     }
