@@ -90,10 +90,11 @@ impl ExactPrisms {
     /// The most primitives that a backend can number.
     const MOST: usize = u32::MAX as usize;
 
+    /// `outline` makes the boxes of blocks.
+    ///
     /// # Errors
     ///
     /// More primitives than [`Self::MOST`].
-    /// `outline` makes the boxes of blocks.
     pub fn new(
         surface: &DisplacedSurface,
         bounds: EditBounds,
