@@ -30,7 +30,7 @@ const FEWEST_TEXELS: f64 = 3.0;
 const THINNEST: f64 = 1e-3;
 
 /// How much a normal may turn from a block's middle to its corners, as a part of its length: the series for 1/|N'| is one in this.
-const MOST_TURN: f64 = 0.4;
+const MOST_TURN: f64 = 0.7;
 
 impl Cutter {
     pub fn new(map: &DisplacementMap) -> Self {

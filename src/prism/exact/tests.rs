@@ -7,6 +7,7 @@ use glam::{Vec2, vec3};
 use super::*;
 use crate::prism::March;
 use crate::prism::kernel::outline;
+use crate::prism::simd::Portable;
 use crate::surface::{Displacement, MeshBuilder, NormalMode, Seams, Texels, UvTransform, Wrap};
 
 /// Numbers in [0, 1).
@@ -201,6 +202,69 @@ fn a_triangle_of_normals_that_turn_by_much_is_one_primitive() {
             "{ray:?} {hit:?}"
         );
     }
+}
+
+/// Normals of an icosahedron's corners: few texels are one primitive, more are blocks in which N' changes by up to [`Cutter`]'s limit.
+#[test]
+fn triangles_of_normals_that_turn_by_less_are_blocks() {
+    let mut random = Random(5);
+    let mut least = f32::INFINITY;
+    for texels in [40.0, 60.0, 80.0, 100.0, 130.0, 250.0] {
+        let builder = MeshBuilder {
+            positions: vec![Vec3::ZERO, Vec3::X, vec3(0.5, 0.8, 0.0)],
+            normals: vec![
+                vec3(-0.52, -0.3, 0.8).normalize(),
+                vec3(0.52, -0.3, 0.8).normalize(),
+                vec3(0.0, 0.6, 0.8).normalize(),
+            ],
+            texcoords: vec![
+                Vec2::ZERO,
+                texels / 256.0 * Vec2::X,
+                texels / 256.0 * vec3(0.4, 0.9, 0.0).truncate(),
+            ],
+            triangles: vec![[0, 1, 2]],
+        };
+        let (mesh, _) = builder.build(NormalMode::File).unwrap();
+        let heights = (0..256 * 256).map(|_| (random.next() * 65535.0) as u16);
+        let map = DisplacementMap::new(256, 256, Texels::U16(heights.collect()), Wrap::Repeat);
+        let surface = DisplacedSurface::new(
+            Arc::new(mesh),
+            Arc::new(map.unwrap()),
+            Displacement::new(0.05),
+        );
+        let prisms = Prisms::new(Arc::new(surface.unwrap()), March::Exact).unwrap();
+        let all = 0..prisms.len() as u32;
+        if exact(&prisms).primitive(0) != Primitive::Whole(0) {
+            least = least.min(texels);
+        }
+        let patch = prisms.surface().patch(0);
+        let mut hits = 0;
+        for _ in 0..400 {
+            let [u, v] = place(&mut random);
+            let at = patch.point(u, v).position.as_vec3();
+            let off = vec3(random.signed(), random.signed(), random.next() + 0.2);
+            let ray = Ray::new(at + 2.0 * off, -off);
+            let frame = RayFrame::new(&ray, axes(&ray));
+            let question = Question {
+                patch: &patch,
+                range: [0.0, 0.1],
+                frame: &frame,
+                interval: [ray.tnear, ray.tfar],
+                any: false,
+            };
+            let truth = within::<Portable>(&question, &Cells::ALL).map(|found| found.t as f32);
+            let found = all.clone().filter_map(|p| prisms.intersect(p, &ray));
+            let nearest = found.map(|hit| hit.t).min_by(f32::total_cmp);
+            hits += usize::from(truth.is_some());
+            let is_same = match (truth, nearest) {
+                (Some(a), Some(b)) => (a - b).abs() < 1e-6,
+                (a, b) => a.is_some() == b.is_some(),
+            };
+            assert!(is_same, "{texels} {ray:?}: {truth:?} {nearest:?}");
+        }
+        assert!(hits > 300, "{hits}");
+    }
+    assert!((60.0..=130.0).contains(&least), "{least}");
 }
 
 /// A triangle, 3000 texels across, over maps of a few texels.
