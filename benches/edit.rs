@@ -2,9 +2,9 @@
 //! `cargo bench --bench edit`.
 //!
 //! The unit sphere of the other benches (a 16-bit map of rock); an edit is 64 x 64 texels somewhere on the map. It either stays within
-//! the room that boxes have (texels become their neighbours), or goes beyond (they become a hill up to the map's largest height). A stroke
-//! is 60 such edits in a row, each a bump 12 texels on from the last; then rays at the stroke are timed against those of a tracer built
-//! anew, on one thread, in turns.
+//! the heights that are there (texels become the lower of two neighbours; tight boxes grow by little, but most do), or goes beyond (they become a hill
+//! up to the map's largest height). A stroke is 60 such edits in a row, each a bump 12 texels on from the last; then rays at the stroke are timed against
+//! those of a tracer built anew, on one thread, in turns.
 //! Options after `--`: `--map TEXELS`, `--rays THOUSANDS`, `--rounds N`, `--cells N` (20 N^2 base triangles), `--only NAME`.
 //! Prints Markdown tables.
 
@@ -22,7 +22,7 @@ use prismarch::embree::{EmbreeOptions, EmbreeTracer};
 use prismarch::prism::{EditBounds, March, PrismOptions, Prisms};
 use prismarch::ray::Ray;
 use prismarch::surface::{BaseMesh, DisplacedSurface, DisplacementMap, TexelRect, Texels};
-use prismarch::trace::{Edited, Object, Placement, Shape, Tracer, World};
+use prismarch::trace::{Edited, Follow, Object, Placement, Settling, Shape, Tracer, World};
 
 const SIDE: usize = 64;
 const DABS: usize = 60;
@@ -46,6 +46,15 @@ impl Editable for BvhTracer {
     }
 }
 
+impl<T: Follow> Editable for Settling<T>
+where
+    T::Error: std::fmt::Debug,
+{
+    fn edited(&mut self, world: &World, map: &Arc<DisplacementMap>, rect: TexelRect) -> Edited {
+        self.map_edited(world, map, rect).expect("a tracer follows")
+    }
+}
+
 type Build = fn(&World) -> Box<dyn Editable>;
 
 #[derive(Clone, Copy)]
@@ -59,10 +68,18 @@ fn contestants() -> Vec<Contestant> {
     let embree: Build =
         |world| Box::new(EmbreeTracer::new(world, &EmbreeOptions::default()).expect("a tree"));
     let bvh: Build = |world| Box::new(BvhTracer::new(world).expect("a tree"));
+    let settling_embree: Build = |world| {
+        let tracer = EmbreeTracer::new(world, &EmbreeOptions::default());
+        Box::new(Settling::new(tracer.expect("a tree")))
+    };
+    let settling_bvh: Build =
+        |world| Box::new(Settling::new(BvhTracer::new(world).expect("a tree")));
     let all = [
         ("embree, tight", embree, EditBounds::Tight),
         ("embree, range", embree, EditBounds::Range),
         ("obvhs, tight", bvh, EditBounds::Tight),
+        ("embree, settling", settling_embree, EditBounds::Tight),
+        ("obvhs, settling", settling_bvh, EditBounds::Tight),
     ];
     let only = word("--only").unwrap_or_default();
     all.into_iter()
@@ -261,7 +278,7 @@ fn edited(old: &Texels, x: usize, edit: Edit) -> Texels {
     };
     Texels::U16(match edit {
         Edit::Within => {
-            // What boxes hold already: texels of one leaf become the lower of themselves and of their neighbours in it.
+            // Texels of one leaf become the lower of themselves and of their neighbours in it.
             let lower = |i: usize| match (x + i % SIDE) % 8 {
                 0 | 7 => old[i],
                 _ => old[i].min(old[(i + 1).min(i / SIDE * SIDE + SIDE - 1)]),

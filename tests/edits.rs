@@ -15,7 +15,7 @@ use prismarch::ray::{Ray, RayPacket};
 use prismarch::surface::{
     DisplacedSurface, Displacement, DisplacementMap, Seams, TexelRect, Texels, UvTransform, Wrap,
 };
-use prismarch::trace::{Edited, Hit, Object, Placement, Shape, Tracer, World};
+use prismarch::trace::{Edited, Follow, Hit, Object, Placement, Settling, Shape, Tracer, World};
 
 const MAP: usize = 64;
 
@@ -253,6 +253,33 @@ fn edits_under_obvhs_are_as_good_as_a_new_tracer() {
     }
 }
 
+/// Whether a new one is made behind the edits or not.
+#[test]
+fn edits_of_a_settling_tracer_are_as_good_as_a_new_one() {
+    settling_law(|world| BvhTracer::new(world).unwrap());
+}
+
+fn settling_law<T: Follow>(build: impl Fn(&World) -> T)
+where
+    T::Error: std::fmt::Debug,
+{
+    law(
+        Wrap::Repeat,
+        EditBounds::Tight,
+        |world| Settling::new(build(world)),
+        |tracer, world, map, rect| {
+            let edited = tracer.map_edited(world, map, rect).unwrap();
+            match rect.x % 3 {
+                0 => tracer.settle(),
+                // Some are made while nobody waits.
+                1 => std::thread::sleep(std::time::Duration::from_millis(40)),
+                _ => {}
+            }
+            edited
+        },
+    );
+}
+
 const CASES: [(Wrap, EditBounds); 4] = [
     (Wrap::Repeat, EditBounds::Tight),
     (Wrap::Repeat, EditBounds::Range),
@@ -280,6 +307,34 @@ mod embree {
                 |tracer, world, map, rect| tracer.map_edited(world, map, rect).unwrap(),
             );
         }
+    }
+
+    #[test]
+    fn edits_of_a_settling_tracer_are_as_good_as_a_new_one() {
+        settling_law(|world| EmbreeTracer::new(world, &EmbreeOptions::default()).unwrap());
+    }
+
+    /// Rays are asked of one scene again, without another edit.
+    #[test]
+    fn a_settling_tracer_settles() {
+        let stage = Stage::new(Wrap::Repeat);
+        let world = stage.world(EditBounds::Tight);
+        let build = || EmbreeTracer::new(&world, &EmbreeOptions::default()).unwrap();
+        let first = |tracer: &EmbreeTracer| -> Vec<_> {
+            let hits = rays(3).map(|ray| tracer.scene().intersect1(&ray));
+            hits.map(|hit| hit.map(|hit| hit.t.to_bits())).collect()
+        };
+        let mut tracer = Settling::new(build());
+        tracer.settle();
+        let mut commits = 0;
+        for number in 0..4 {
+            let rect = stage.edit(number, [0, u16::MAX]);
+            let edited = tracer.map_edited(&world, &stage.map, rect).unwrap();
+            commits += u32::from(edited.committed);
+        }
+        assert!(commits > 0);
+        tracer.settle();
+        assert_eq!(first(tracer.tracer()), first(&build()));
     }
 
     /// All is in one scene again, and the edits are in it.

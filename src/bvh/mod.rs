@@ -22,7 +22,8 @@ use thiserror::Error;
 use crate::ray::{Aabb, Ray};
 use crate::surface::{DisplacementMap, TexelRect};
 use crate::trace::{
-    Edited, Hit, INVALID_ID, Placement, RayReach, Tracer, World, WorldError, grown, placed,
+    Edited, Follow, Hit, INVALID_ID, Maker, Placement, RayReach, Tracer, World, WorldError, grown,
+    placed,
 };
 use object::{Closest, ObjectTree, boxes};
 use tree::Tree;
@@ -154,28 +155,10 @@ impl BvhTracer {
         map: &Arc<DisplacementMap>,
         rect: TexelRect,
     ) -> Result<Edited, BvhError> {
-        self.check_same_layout(world)?;
         let prims_touched = world.map_edited(map, rect);
-        let growths = world.growths();
-        let grown = grown(&self.growths, &growths);
-        if !grown.is_empty() {
-            let boxes_of = |&index: &usize| boxes(&world.objects()[index].shape, index);
-            let new = grown.iter().map(boxes_of).collect::<Result<Vec<_>, _>>()?;
-            let mut bounds: Vec<Aabb> = self.objects.iter().map(ObjectTree::bounds).collect();
-            for (&index, boxes) in grown.iter().zip(&new) {
-                bounds[index] = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
-            }
-            let (places, place_boxes) = places(world, &bounds)?;
-            for (&index, boxes) in grown.iter().zip(&new) {
-                self.objects[index].refit(&world.objects()[index].shape, boxes);
-            }
-            self.places = places;
-            self.top.refit(&place_boxes);
-            self.growths = growths;
-        }
         Ok(Edited {
             prims_touched,
-            committed: !grown.is_empty(),
+            committed: self.follow(world)?,
         })
     }
 
@@ -232,6 +215,36 @@ impl BvhTracer {
             inst: [inst],
             ng: hit.ng,
         }
+    }
+}
+
+impl Follow for BvhTracer {
+    type Error = BvhError;
+
+    fn follow(&mut self, world: &World) -> Result<bool, BvhError> {
+        self.check_same_layout(world)?;
+        let growths = world.growths();
+        let grown = grown(&self.growths, &growths);
+        if !grown.is_empty() {
+            let boxes_of = |&index: &usize| boxes(&world.objects()[index].shape, index);
+            let new = grown.iter().map(boxes_of).collect::<Result<Vec<_>, _>>()?;
+            let mut bounds: Vec<Aabb> = self.objects.iter().map(ObjectTree::bounds).collect();
+            for (&index, boxes) in grown.iter().zip(&new) {
+                bounds[index] = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
+            }
+            let (places, place_boxes) = places(world, &bounds)?;
+            for (&index, boxes) in grown.iter().zip(&new) {
+                self.objects[index].refit(&world.objects()[index].shape, boxes);
+            }
+            self.places = places;
+            self.top.refit(&place_boxes);
+            self.growths = growths;
+        }
+        Ok(!grown.is_empty())
+    }
+
+    fn maker(&self) -> Maker<Self, BvhError> {
+        Box::new(Self::new)
     }
 }
 

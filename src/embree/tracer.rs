@@ -11,7 +11,7 @@ use super::{
 };
 use crate::ray::{Aabb, Ray, RayPacket};
 use crate::surface::{DisplacementMap, TexelRect};
-use crate::trace::{Edited, Hit, Object, Placement, Shape, Tracer, World, grown};
+use crate::trace::{Edited, Follow, Hit, Maker, Object, Placement, Shape, Tracer, World, grown};
 
 /// How Embree builds a world.
 #[derive(Clone, Debug, Default)]
@@ -60,15 +60,19 @@ impl EmbreeTracer {
             robust: true,
             ..SceneOptions::default()
         };
+        Self::on(&device, options, world)
+    }
+
+    fn on(device: &Device, options: SceneOptions, world: &World) -> Result<Self, EmbreeError> {
         // Before any bounds are read.
         let growths = world.growths();
         let parts = parts_of(world);
         Ok(Self {
-            scene: whole(&device, options, world, &parts)?,
+            scene: whole(device, options, world, &parts)?,
             parts,
             grown: None,
             growths,
-            device,
+            device: device.clone(),
             options,
         })
     }
@@ -94,17 +98,10 @@ impl EmbreeTracer {
         map: &Arc<DisplacementMap>,
         rect: TexelRect,
     ) -> Result<Edited, EmbreeError> {
-        assert_eq!(world.objects().len(), self.parts.len(), "another world");
         let prims_touched = world.map_edited(map, rect);
-        let growths = world.growths();
-        let committed = !grown(&self.growths, &growths).is_empty();
-        if committed {
-            self.take_grown(world)?;
-            self.growths = growths;
-        }
         Ok(Edited {
             prims_touched,
-            committed,
+            committed: self.follow(world)?,
         })
     }
 
@@ -134,6 +131,7 @@ impl EmbreeTracer {
     ///
     /// What Embree reports; then the tracer is of no use any more.
     pub fn settle(&mut self, world: &World) -> Result<(), EmbreeError> {
+        world.tighten();
         self.growths = world.growths();
         self.parts = parts_of(world);
         self.grown = None;
@@ -232,6 +230,26 @@ fn until(hit: &Hit, ray: &Ray) -> Ray {
     Ray {
         tfar: hit.t,
         ..*ray
+    }
+}
+
+impl Follow for EmbreeTracer {
+    type Error = EmbreeError;
+
+    fn follow(&mut self, world: &World) -> Result<bool, EmbreeError> {
+        assert_eq!(world.objects().len(), self.parts.len(), "another world");
+        let growths = world.growths();
+        let has_grown = !grown(&self.growths, &growths).is_empty();
+        if has_grown {
+            self.take_grown(world)?;
+            self.growths = growths;
+        }
+        Ok(has_grown)
+    }
+
+    fn maker(&self) -> Maker<Self, EmbreeError> {
+        let (device, options) = (self.device.clone(), self.options);
+        Box::new(move |world| Self::on(&device, options, world))
     }
 }
 

@@ -71,6 +71,16 @@ impl Prisms {
         growth
     }
 
+    /// Takes the bounds of what edits have touched anew, as those of new prisms are: [`Self::map_edited`] only widens them, so that they also hold what is
+    /// long edited away. For who makes a new tree; trees that are there already hold the surface nevertheless.
+    ///
+    /// May run while rays are in flight and beside edits.
+    pub fn tighten(&self) {
+        if let Parts::Exact(exact) = &self.parts {
+            exact.tighten(&self.surface, self.room);
+        }
+    }
+
     fn grow_exact(
         &self,
         exact: &ExactPrisms,
@@ -103,10 +113,7 @@ impl Prisms {
         let others = widened
             .iter()
             .flat_map(|&triangle| exact.others_of(triangle));
-        let mut primitives: Vec<u32> = blocks
-            .chain(others)
-            .filter(|&primitive| exact.widen(surface, self.room, primitive))
-            .collect();
+        let mut primitives = exact.widen(surface, self.room, blocks.chain(others));
         primitives.sort_unstable();
         Growth {
             change: BoundsChange {

@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use glam::{DVec2, Vec3};
 
@@ -31,6 +32,8 @@ pub struct ExactPrisms {
     walled: Vec<u32>,
     /// By primitive.
     boxes: Vec<StoredBox>,
+    /// Those whose texels were edited since their boxes were tight; held by who changes boxes.
+    touched: Mutex<Vec<u32>>,
     outline: Outline,
     /// What texels mean, when the prisms were made; and bits of the largest |D| since.
     heights: Heights,
@@ -72,6 +75,13 @@ impl StoredBox {
         Aabb {
             min: Vec3::new(at(0), at(1), at(2)),
             max: Vec3::new(at(3), at(4), at(5)),
+        }
+    }
+
+    fn set(&self, bounds: Aabb) {
+        let new = Self::new(bounds);
+        for (stored, new) in self.0.iter().zip(new.0) {
+            stored.store(new.into_inner(), Ordering::Relaxed);
         }
     }
 
@@ -118,6 +128,7 @@ impl ExactPrisms {
             wholes: Vec::new(),
             walled: Vec::new(),
             boxes: Vec::new(),
+            touched: Mutex::default(),
             outline,
             heights: Heights::new(surface),
             most: AtomicU32::new(0),
@@ -249,10 +260,43 @@ impl ExactPrisms {
         }
     }
 
-    /// Takes bounds again after an edit; whether they have grown.
-    pub fn widen(&self, surface: &DisplacedSurface, room: Option<(f32, f32)>, index: u32) -> bool {
-        let bounds = self.bounds_now(surface, room, index);
-        bounds.is_valid() && self.boxes[index as usize].widen(bounds)
+    /// Takes the bounds of some primitives again after an edit; those that have grown.
+    pub fn widen(
+        &self,
+        surface: &DisplacedSurface,
+        room: Option<(f32, f32)>,
+        primitives: impl Iterator<Item = u32>,
+    ) -> Vec<u32> {
+        let mut touched = self.touched();
+        // Not more than there are, however long nobody tightens them.
+        if touched.len() > self.boxes.len() {
+            touched.sort_unstable();
+            touched.dedup();
+        }
+        let grow = |&index: &u32| {
+            touched.push(index);
+            let bounds = self.bounds_now(surface, room, index);
+            bounds.is_valid() && self.boxes[index as usize].widen(bounds)
+        };
+        primitives.filter(grow).collect()
+    }
+
+    fn touched(&self) -> MutexGuard<'_, Vec<u32>> {
+        self.touched.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes the bounds of what edits have touched anew, without what they were.
+    pub fn tighten(&self, surface: &DisplacedSurface, room: Option<(f32, f32)>) {
+        // What an edit writes meanwhile is widened after this.
+        let mut touched = self.touched();
+        touched.sort_unstable();
+        touched.dedup();
+        for index in touched.drain(..) {
+            let bounds = self.bounds_now(surface, room, index);
+            if bounds.is_valid() {
+                self.boxes[index as usize].set(bounds);
+            }
+        }
     }
 
     /// Where a primitive reads the map, in texel coordinates; of walls, where they do beyond their triangle.
@@ -314,14 +358,14 @@ impl ExactPrisms {
 pub struct Asked<'a> {
     pub prisms: &'a Prisms,
     pub primitive: u32,
-    pub corners: Option<Corners>,
+    pub corners: Option<&'a Corners>,
 }
 
 impl<'a> Asked<'a> {
     fn patch(&self, triangle: u32) -> Patch<'a> {
         let surface = &self.prisms.surface;
         match self.corners {
-            Some(corners) => surface.patch_over(triangle, corners),
+            Some(&corners) => surface.patch_over(triangle, corners),
             None => surface.patch(triangle),
         }
     }

@@ -275,7 +275,7 @@ impl Prisms {
     }
 
     #[inline(always)]
-    fn asked(&self, primitive: u32, corners: Option<Corners>) -> Asked<'_> {
+    fn asked<'a>(&'a self, primitive: u32, corners: Option<&'a Corners>) -> Asked<'a> {
         Asked {
             prisms: self,
             primitive,

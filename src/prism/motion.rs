@@ -140,9 +140,8 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.intersect(primitive, ray);
         }
-        let asked = self
-            .prisms
-            .asked(primitive, Some(self.corners(primitive, ray)));
+        let corners = self.corners(primitive, ray);
+        let asked = self.prisms.asked(primitive, Some(&corners));
         let hit = self.prisms.kernel.intersect(&asked, ray)?;
         // A triangle may have no area for a moment.
         hit.ng.is_finite().then_some(hit)
@@ -153,9 +152,8 @@ impl MovingPrisms {
         if self.time_steps() == 1 {
             return self.prisms.occluded(primitive, ray);
         }
-        let asked = self
-            .prisms
-            .asked(primitive, Some(self.corners(primitive, ray)));
+        let corners = self.corners(primitive, ray);
+        let asked = self.prisms.asked(primitive, Some(&corners));
         self.prisms.kernel.occluded(&asked, ray)
     }
 

@@ -25,6 +25,15 @@ impl World {
         prisms.map(|prisms| prisms.map_edited(rect).touched).sum()
     }
 
+    /// Takes the bounds of all that edits have touched [anew](crate::prism::Prisms::tighten), before a new tree is made.
+    pub fn tighten(&self) {
+        for object in self.objects() {
+            if let Shape::Displaced(prisms) = &object.shape {
+                prisms.tighten();
+            }
+        }
+    }
+
     /// By object, how often its bounds have [grown](crate::prism::Prisms::growths). What two objects or two tracers share
     /// grows once: so each tracer compares for itself.
     pub fn growths(&self) -> Vec<u64> {

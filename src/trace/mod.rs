@@ -4,6 +4,7 @@ mod edit;
 mod limits;
 mod offset;
 mod reach;
+mod settling;
 mod world;
 
 use glam::Vec3;
@@ -15,6 +16,7 @@ pub use limits::WorldError;
 pub(crate) use limits::placed;
 pub use offset::RayOffset;
 pub use reach::{MAX_STRETCH, RayReach, TransformError};
+pub use settling::{Follow, Maker, Settling};
 pub use world::{Object, PlacedObject, Placement, Resolved, Shape, World};
 
 /// Instance levels a hit can hold: one, as Debian's Embree is built.

@@ -27,7 +27,7 @@ pub struct Ask<'a> {
     pub record: &'a Record,
     pub block: Block,
     /// Where the triangle's corners are, if not where the mesh has them.
-    pub corners: Option<Corners>,
+    pub corners: Option<&'a Corners>,
     /// Whether any crossing will do.
     pub any: bool,
 }
@@ -172,7 +172,7 @@ impl<'a> Search<'a> {
     fn patch(&self) -> Patch<'a> {
         let Ask { surface, block, .. } = *self.ask;
         match self.ask.corners {
-            Some(corners) => surface.patch_over(block.triangle, corners),
+            Some(&corners) => surface.patch_over(block.triangle, corners),
             None => surface.patch(block.triangle),
         }
     }

@@ -350,3 +350,51 @@ fn a_large_mesh_is_not_searched() {
         assert!((900..2000).contains(&touched), "{touched}");
     }
 }
+
+/// What edits have widened becomes what new prisms have, and holds what edits do afterwards.
+#[test]
+fn tightened_bounds_are_those_of_new_prisms() {
+    for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+        let surface = patchwork(wrap, Seams::Open);
+        let map = surface.map().clone();
+        let new = || Prisms::new(surface.clone(), March::Exact).unwrap();
+        let all = |prisms: &Prisms| -> Vec<Aabb> {
+            (0..prisms.len() as u32).map(|p| prisms.bounds(p)).collect()
+        };
+        let prisms = new();
+        let mut were_loose = 0;
+        for (k, (rect, texel)) in wild_edits().enumerate() {
+            // Back and forth.
+            let texel = if k % 3 == 0 { 20_000 } else { texel };
+            let texels = Texels::U16(vec![texel; rect.width * rect.height]);
+            map.update(rect, &texels).unwrap();
+            prisms.map_edited(rect);
+            if k % 4 == 3 {
+                let blocks = all(&new());
+                were_loose += usize::from(all(&prisms) != blocks);
+                prisms.tighten();
+                let others = not_blocks(&prisms);
+                for (primitive, (is, new)) in (0u32..).zip(all(&prisms).iter().zip(&blocks)) {
+                    // Roundings are a part of the map's largest height, at the time.
+                    let off = (new.min - is.min).max(is.max - new.max);
+                    let most = off.max_element();
+                    assert!(off.min_element() > -1e-6, "{wrap:?} {k} {primitive}: {off}");
+                    // A triangle's range of heights is not taken back.
+                    let is_block = !others.contains(&primitive);
+                    assert!(!is_block || most < 1e-4, "{wrap:?} {k} {primitive}: {most}");
+                }
+            }
+        }
+        assert!(were_loose > 5, "{were_loose}");
+    }
+}
+
+/// The primitives that are no blocks.
+fn not_blocks(prisms: &Prisms) -> Vec<u32> {
+    let Parts::Exact(exact) = &prisms.parts else {
+        panic!("the exact march's");
+    };
+    let all = 0..prisms.len() as u32;
+    let is_block = |p: &u32| matches!(exact.primitive(*p), Primitive::Block(_));
+    all.filter(|p| !is_block(p)).collect()
+}
