@@ -191,7 +191,7 @@ impl Vertices {
             let point = eye.sees(truth.point(texel));
             let off = DVec2::new(x, y).distance(point.truncate());
             self.sideways.of(off, leaf.off.into(), what);
-            let off = (z + view.time - point.z).abs();
+            let off = (z + view.t0 - point.z).abs();
             self.along.of(off, leaf.depth_off.into(), what);
             // What is in the triangle is not taken for what is outside.
             const SLACK: f64 = 1e-3;
@@ -298,7 +298,7 @@ fn parts_and_boxes_hold_the_surface() {
                     let off = (low - point).max(point - high).max_element();
                     assert!(off <= slack, "{:?} {block:?}: {off}", case.kind);
                     boxes += 1;
-                    let point = eye.sees(point) - DVec3::new(0.0, 0.0, view.time);
+                    let point = eye.sees(point) - DVec3::new(0.0, 0.0, view.t0);
                     for ((at, [c, off]), largest) in point
                         .to_array()
                         .into_iter()

@@ -31,7 +31,7 @@ pub struct View<'m> {
     /// Lengths along the ray in ray parameters.
     pub per_length: f32,
     /// Ray parameter of the block's middle.
-    pub time: f64,
+    pub t0: f64,
     /// tnear and tfar from there, not narrower; all of space where `is_usual` is false.
     pub interval: [f32; 2],
     /// The same, not wider: what is between is in the interval also when its ray parameter is rounded. Empty where `is_usual` is false.
@@ -66,7 +66,7 @@ impl<'m> View<'m> {
         let depth = from(wz, frame.origin[2]);
         let u0 = (from(wx, frame.origin[0]) - frame.shear[0] * depth) as f32;
         let v0 = (from(wy, frame.origin[1]) - frame.shear[1] * depth) as f32;
-        let time = depth * frame.per_depth;
+        let t0 = depth * frame.per_depth;
         let is_usual = {
             let length = frame.per_depth.abs();
             length < LONGEST && length > 1.0 / LONGEST
@@ -79,8 +79,8 @@ impl<'m> View<'m> {
         let all = [f32::NEG_INFINITY, f32::INFINITY];
         let (interval, inner) = if is_usual {
             (
-                [before(ray.tnear, time), behind(ray.tfar, time)],
-                [after(ray.tnear, time), -after(-ray.tfar, -time)],
+                [before(ray.tnear, t0), behind(ray.tfar, t0)],
+                [after(ray.tnear, t0), -after(-ray.tfar, -t0)],
             )
         } else {
             (all, [all[1], all[0]])
@@ -111,13 +111,13 @@ impl<'m> View<'m> {
             depth_noise: per_depth.abs() * rounding(middle.size),
             shear: (1.0 + shear[0] * shear[0] + shear[1] * shear[1]).sqrt() * (1.0 + 1e-6),
             per_length: per_depth.abs(),
-            time,
+            t0,
             interval,
             inner,
             is_sound: middle.is_tame()
                 && size < LARGEST
                 && middle.size > SMALLEST
-                && time.abs() < 1e30,
+                && t0.abs() < 1e30,
             is_usual,
             middle,
         }
@@ -127,8 +127,8 @@ impl<'m> View<'m> {
     #[inline(always)]
     pub fn end_at(&mut self, t: f32) {
         if self.is_usual {
-            self.interval[1] = behind(t, self.time);
-            self.inner[1] = -after(-t, -self.time);
+            self.interval[1] = behind(t, self.t0);
+            self.inner[1] = -after(-t, -self.t0);
         }
     }
 }
@@ -141,22 +141,22 @@ pub fn rounding(size: f32) -> f32 {
 
 /// A ray parameter from another, not farther.
 #[inline(always)]
-fn before(t: f32, time: f64) -> f32 {
-    let t = (f64::from(t) - time) as f32;
+fn before(t: f32, t0: f64) -> f32 {
+    let t = (f64::from(t) - t0) as f32;
     t - t.abs() * f32::EPSILON
 }
 
 /// The same, farther by what rounding a ray parameter moves it.
 #[inline(always)]
-fn after(t: f32, time: f64) -> f32 {
+fn after(t: f32, t0: f64) -> f32 {
     // From infinity what rounding moves would be no number.
-    let from = f64::from(t.max(f32::MIN)) - time;
-    (from + 2.0 * f64::from(f32::EPSILON) * (from.abs() + time.abs())) as f32
+    let from = f64::from(t.max(f32::MIN)) - t0;
+    (from + 2.0 * f64::from(f32::EPSILON) * (from.abs() + t0.abs())) as f32
 }
 
 /// The same, not nearer.
 #[inline(always)]
-fn behind(t: f32, time: f64) -> f32 {
-    let t = (f64::from(t) - time) as f32;
+fn behind(t: f32, t0: f64) -> f32 {
+    let t = (f64::from(t) - t0) as f32;
     t + t.abs() * f32::EPSILON
 }
