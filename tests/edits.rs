@@ -19,6 +19,13 @@ use prismarch::trace::{Edited, Follow, Hit, Object, Placement, Settling, Shape, 
 
 const MAP: usize = 64;
 
+const EVERYTHING: TexelRect = TexelRect {
+    x: 0,
+    y: 0,
+    width: MAP,
+    height: MAP,
+};
+
 /// A sphere in world space and two instances of another over the same map (more than once, and beyond its edges), a third over a map
 /// that is never edited, one of few large triangles with closed seams, and one of triangles of less than a few texels.
 struct Stage {
@@ -30,13 +37,7 @@ impl Stage {
     fn new(wrap: Wrap) -> Self {
         let rock = |seed| {
             let map = rock_map(MAP, seed);
-            let all = TexelRect {
-                x: 0,
-                y: 0,
-                width: MAP,
-                height: MAP,
-            };
-            let texels = map.read(all).unwrap();
+            let texels = map.read(EVERYTHING).unwrap();
             Arc::new(DisplacementMap::new(MAP, MAP, texels, wrap).unwrap())
         };
         Self {
@@ -170,18 +171,12 @@ fn room<T: Tracer>(
     let stage = Stage::new(wrap);
     let world = stage.world(edit_bounds);
     let mut tracer = build(&world);
-    let all = TexelRect {
-        x: 0,
-        y: 0,
-        width: MAP,
-        height: MAP,
-    };
     for parity in [0, 1] {
         let is_high = |i: usize| (i % MAP + i / MAP) % 2 == parity;
         let texels = (0..MAP * MAP).map(|i| if is_high(i) { u16::MAX } else { 0 });
         let texels = Texels::U16(texels.collect());
-        stage.map.update(all, &texels).unwrap();
-        told(&mut tracer, &world, &stage.map, all);
+        stage.map.update(EVERYTHING, &texels).unwrap();
+        told(&mut tracer, &world, &stage.map, EVERYTHING);
     }
     for number in 8..12 {
         let rect = stage.edit(number, [500, 65_000]);
@@ -255,10 +250,7 @@ fn edits_under_obvhs_are_as_good_as_a_new_tracer() {
     for (wrap, edit_bounds) in CASES {
         let build = |world: &World| BvhTracer::new(world).unwrap();
         let told = |tracer: &mut BvhTracer, world: &World, map: &Arc<DisplacementMap>, rect| {
-            let before = bounds(world);
-            let edited = tracer.map_edited(world, map, rect).unwrap();
-            assert_eq!(edited.committed, before != bounds(world), "{rect}");
-            edited
+            checked(world, || tracer.map_edited(world, map, rect).unwrap())
         };
         law(wrap, edit_bounds, build, told);
         room(wrap, edit_bounds, build, told);
@@ -292,6 +284,14 @@ where
     );
 }
 
+/// An edit commits where bounds have grown, and only there.
+fn checked(world: &World, edit: impl FnOnce() -> Edited) -> Edited {
+    let before = bounds(world);
+    let edited = edit();
+    assert_eq!(edited.committed, before != bounds(world));
+    edited
+}
+
 const CASES: [(Wrap, EditBounds); 4] = [
     (Wrap::Repeat, EditBounds::Tight),
     (Wrap::Repeat, EditBounds::Range),
@@ -316,10 +316,7 @@ mod embree {
                 |world: &World| EmbreeTracer::new(world, &EmbreeOptions::default()).unwrap();
             let told =
                 |tracer: &mut EmbreeTracer, world: &World, map: &Arc<DisplacementMap>, rect| {
-                    let before = bounds(world);
-                    let edited = tracer.map_edited(world, map, rect).unwrap();
-                    assert_eq!(edited.committed, before != bounds(world), "{rect}");
-                    edited
+                    checked(world, || tracer.map_edited(world, map, rect).unwrap())
                 };
             law(wrap, edit_bounds, build, told);
             room(wrap, edit_bounds, build, told);
@@ -329,6 +326,37 @@ mod embree {
     #[test]
     fn edits_of_a_settling_tracer_are_as_good_as_a_new_one() {
         settling_law(|world| EmbreeTracer::new(world, &EmbreeOptions::default()).unwrap());
+    }
+
+    /// An edit is taken back, and bounds become what they were when the large scene was built.
+    #[test]
+    fn what_has_shrunk_again_is_not_lost() {
+        let stage = Stage::new(Wrap::Repeat);
+        let world = stage.world(EditBounds::Tight);
+        let build = || EmbreeTracer::new(&world, &EmbreeOptions::default()).unwrap();
+        let mut tracer = build();
+        let new = bounds(&world);
+        let before = stage.map.read(EVERYTHING).unwrap();
+        let mut commits = 0;
+        for number in 0..4 {
+            let rect = stage.edit(number, [0, u16::MAX]);
+            tracer.map_edited(&world, &stage.map, rect).unwrap();
+            stage.map.update(EVERYTHING, &before).unwrap();
+            tracer.map_edited(&world, &stage.map, EVERYTHING).unwrap();
+            world.tighten();
+            let now = bounds(&world);
+            let is_back = new.iter().zip(&now).filter(|(a, b)| a == b).count();
+            assert!(is_back > new.len() / 2, "{is_back} of {}", new.len());
+            // One more, so that the tracer looks at bounds again.
+            let rect = stage.edit(number + 4, [0, u16::MAX]);
+            let edited = tracer.map_edited(&world, &stage.map, rect).unwrap();
+            commits += u32::from(edited.committed);
+            assert_same(&tracer, &build(), number);
+            stage.map.update(EVERYTHING, &before).unwrap();
+            tracer.map_edited(&world, &stage.map, EVERYTHING).unwrap();
+            world.tighten();
+        }
+        assert!(commits > 1, "{commits}");
     }
 
     /// Rays are asked of one scene again, without another edit.

@@ -36,12 +36,13 @@ impl Part {
         size_of_val(&self.boxes[..]) + size_of_val(&self.has_left[..])
     }
 
-    /// What has grown since the large scene was built: it leaves it.
+    /// What has other bounds than when the large scene was built: it leaves it, and what has the same again comes back.
     pub(super) fn grown(&self) -> Grown {
         let mut primitives = Vec::new();
         for ((primitive, known), has_left) in (0u32..).zip(&self.boxes).zip(&self.has_left) {
-            if self.prisms.bounds(primitive) != *known {
-                has_left.store(true, Ordering::Relaxed);
+            let differs = self.prisms.bounds(primitive) != *known;
+            has_left.store(differs, Ordering::Relaxed);
+            if differs {
                 primitives.push(primitive);
             }
         }

@@ -72,7 +72,8 @@ impl Prisms {
     }
 
     /// Takes the bounds of what edits have touched anew, as those of new prisms are: [`Self::map_edited`] only widens them, so that they also hold what is
-    /// long edited away. For who makes a new tree; trees that are there already hold the surface nevertheless.
+    /// long edited away. For who makes a new tree; trees that are there already hold the surface nevertheless. Bounds only shrink by this: texels that
+    /// [`Self::map_edited`] was not told of yet make none grow.
     ///
     /// May run while rays are in flight and beside edits.
     pub fn tighten(&self) {

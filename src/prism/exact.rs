@@ -78,11 +78,16 @@ impl StoredBox {
         }
     }
 
-    fn set(&self, bounds: Aabb) {
-        let new = Self::new(bounds);
-        for (stored, new) in self.0.iter().zip(new.0) {
-            stored.store(new.into_inner(), Ordering::Relaxed);
+    /// Whether it held `wanted`, which it is from now on.
+    fn shrink(&self, wanted: Aabb) -> bool {
+        let held = self.get();
+        let holds = held.union(wanted) == held;
+        if holds {
+            for (stored, new) in self.0.iter().zip(Self::new(wanted).0) {
+                stored.store(new.into_inner(), Ordering::Relaxed);
+            }
         }
+        holds
     }
 
     /// Whether it did not hold `wanted`.
@@ -287,14 +292,19 @@ impl ExactPrisms {
 
     /// Takes the bounds of what edits have touched anew, without what they were.
     pub fn tighten(&self, surface: &DisplacedSurface, room: Option<(f32, f32)>) {
-        // What an edit writes meanwhile is widened after this.
-        let mut touched = self.touched();
-        touched.sort_unstable();
-        touched.dedup();
-        for index in touched.drain(..) {
-            let bounds = self.bounds_now(surface, room, index);
-            if bounds.is_valid() {
-                self.boxes[index as usize].set(bounds);
+        // Few at a time: edits wait meanwhile.
+        const PORTION: usize = 32;
+        let mut all = std::mem::take(&mut *self.touched());
+        all.sort_unstable();
+        all.dedup();
+        for portion in all.chunks(PORTION) {
+            let mut touched = self.touched();
+            for &index in portion {
+                let bounds = self.bounds_now(surface, room, index);
+                // What has texels by now that nobody was told of grows when that is told, and not in silence.
+                if bounds.is_valid() && !self.boxes[index as usize].shrink(bounds) {
+                    touched.push(index);
+                }
             }
         }
     }

@@ -64,8 +64,10 @@ struct Shared<T: Follow> {
 
 struct State<T: Follow> {
     wanted: Option<Wanted<T>>,
-    is_making: bool,
+    /// Where the one will be that is being made.
+    making: Option<Slot<T>>,
     error: Option<T::Error>,
+    /// Nothing is made any more.
     is_closed: bool,
 }
 
@@ -94,36 +96,59 @@ impl<T: Follow> Shared<T> {
         waited.unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes what is wanted until it is closed.
-    fn run(&self, make: &Maker<T, T::Error>) {
+    /// What is due, once something is; none when it is closed. From then on it is being made.
+    fn next(&self) -> Option<World> {
         let mut state = self.lock();
         while !state.is_closed {
-            let Some(wanted) = &state.wanted else {
+            let Some(wanted) = state.wanted.take() else {
                 state = self.wait(state);
                 continue;
             };
             let left = wanted.due.saturating_duration_since(Instant::now());
-            if !left.is_zero() {
-                let waited = self.changed.wait_timeout(state, left);
-                state = waited.unwrap_or_else(PoisonError::into_inner).0;
-                continue;
+            if left.is_zero() {
+                state.making = Some(wanted.slot);
+                return Some(wanted.world);
             }
-            let wanted = state.wanted.take();
-            state.is_making = true;
-            drop(state);
-            let made = wanted.map(|wanted| {
-                wanted.world.tighten();
-                (make(&wanted.world), wanted.slot)
-            });
-            state = self.lock();
-            state.is_making = false;
-            match made {
-                Some((Ok(made), slot)) => drop(slot.set(made)),
-                Some((Err(error), _)) => state.error = Some(error),
-                None => {}
+            state.wanted = Some(wanted);
+            let waited = self.changed.wait_timeout(state, left);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+        None
+    }
+
+    /// Makes what is wanted until it is closed.
+    fn run(&self, make: &Maker<T, T::Error>) {
+        // Also where making one panics.
+        let _closes = Closes(self);
+        while let Some(world) = self.next() {
+            world.tighten();
+            let made = make(&world);
+            let mut state = self.lock();
+            match (made, state.making.take()) {
+                // It is empty: nobody else writes there.
+                (Ok(made), Some(slot)) => drop(slot.set(made)),
+                (Ok(_), None) => {}
+                (Err(error), _) => state.error = Some(error),
             }
             self.changed.notify_all();
         }
+    }
+
+    fn close(&self) {
+        let mut state = self.lock();
+        state.is_closed = true;
+        state.wanted = None;
+        state.making = None;
+        self.changed.notify_all();
+    }
+}
+
+/// Closes it when it goes.
+struct Closes<'s, T: Follow>(&'s Shared<T>);
+
+impl<T: Follow> Drop for Closes<'_, T> {
+    fn drop(&mut self) {
+        self.0.close();
     }
 }
 
@@ -133,7 +158,7 @@ impl<T: Follow> Settling<T> {
         let shared = Shared {
             state: Mutex::new(State {
                 wanted: None,
-                is_making: false,
+                making: None,
                 error: None,
                 is_closed: false,
             }),
@@ -144,13 +169,17 @@ impl<T: Follow> Settling<T> {
             let shared = shared.clone();
             move || shared.run(&make)
         };
+        let thread = thread::Builder::new().spawn(run).ok();
+        if thread.is_none() {
+            // Then it only follows.
+            shared.close();
+        }
         Self {
             tracer,
             settled: Slot::default(),
             late: None,
             shared,
-            // Without a thread it only follows.
-            thread: thread::Builder::new().spawn(run).ok(),
+            thread,
         }
     }
 
@@ -178,8 +207,9 @@ impl<T: Follow> Settling<T> {
             self.take(settled);
         }
         let committed = self.tracer.follow(world)?;
-        if committed && self.thread.is_some() {
-            if state.is_making && self.late.is_none() {
+        if committed && !state.is_closed {
+            let is_made_there = |slot: &Slot<T>| Arc::ptr_eq(slot, &self.settled);
+            if state.making.as_ref().is_some_and(is_made_there) {
                 self.late = Some(std::mem::take(&mut self.settled));
             }
             let now = Instant::now();
@@ -207,10 +237,11 @@ impl<T: Follow> Settling<T> {
         }
     }
 
-    /// Waits until rays are as fast as those of a new tracer, without waiting for a pause; not at all where no thread could be started.
+    /// Waits until rays are as fast as those of a new tracer, without waiting for a pause; not at all where no thread could be started, or where it has
+    /// panicked.
     pub fn settle(&self) {
         let mut state = self.shared.lock();
-        while self.thread.is_some() && (state.wanted.is_some() || state.is_making) {
+        while state.wanted.is_some() || state.making.is_some() {
             if let Some(wanted) = &mut state.wanted {
                 wanted.due = wanted.since;
                 self.shared.changed.notify_all();
@@ -227,8 +258,7 @@ impl<T: Follow> Settling<T> {
 
 impl<T: Follow> Drop for Settling<T> {
     fn drop(&mut self) {
-        self.shared.lock().is_closed = true;
-        self.shared.changed.notify_all();
+        self.shared.close();
         if let Some(thread) = self.thread.take() {
             // It has nothing to say any more.
             drop(thread.join());
@@ -266,3 +296,6 @@ impl<T: Follow> Tracer for Settling<T> {
         self.tracer.name()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -389,6 +389,32 @@ fn tightened_bounds_are_those_of_new_prisms() {
     }
 }
 
+/// Texels that nobody has been told of: what they make grow is told when they are, and not swallowed by who takes bounds anew.
+#[test]
+fn tightening_tells_of_nothing() {
+    let surface = patchwork(Wrap::Repeat, Seams::Open);
+    let map = surface.map().clone();
+    let prisms = Prisms::new(surface.clone(), March::Exact).unwrap();
+    let rect = TexelRect {
+        x: 40,
+        y: 30,
+        width: 3,
+        height: 3,
+    };
+    let set = |texel: u16| map.update(rect, &Texels::U16(vec![texel; 9])).unwrap();
+    set(30_000);
+    let first = prisms.map_edited(rect);
+    for texel in [40_000, 50_000] {
+        set(texel);
+        prisms.tighten();
+        assert_eq!(prisms.map_edited(rect).primitives, first.primitives);
+        assert_holds(&prisms);
+    }
+    assert!(first.any());
+    prisms.tighten();
+    assert!(!prisms.map_edited(rect).any());
+}
+
 /// The primitives that are no blocks.
 fn not_blocks(prisms: &Prisms) -> Vec<u32> {
     let Parts::Exact(exact) = &prisms.parts else {
