@@ -58,11 +58,9 @@ fn corpus(target: &Target) -> Vec<(String, Vec<u8>)> {
 fn holds(name: &str) {
     prepare();
     let target = loaders::find(name).unwrap();
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("fuzzing")
-        .join(name);
-    // A run that ended here has left its input in there: it is told, then written over.
-    let bench = target.bench(&folder);
+    // Of this run alone: two at once would read each other's inputs.
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let bench = target.bench(folder.path());
     let files = corpus(target);
     assert!(
         files.iter().any(|(name, _)| name.starts_with(SOUND)),
