@@ -70,7 +70,10 @@ impl ScalarImage {
 
     /// Its derivatives by the texture coordinates, without jumps at pixels' borders: central differences over two pixels.
     pub fn smooth_gradient(&self, st: Vec2) -> Vec2 {
-        let by_pixel = self.grid.smooth(self.grid.to_texel(st.as_dvec2())).gradient;
+        let by_pixel = self
+            .grid
+            .smooth(self.grid.to_texel(st.as_dvec2()), 2.0)
+            .gradient;
         by_pixel.as_vec2() * Vec2::new(self.grid.width as f32, self.grid.height as f32)
     }
 

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::{PrismHit, Prisms};
 use crate::ray::Footprint;
-use crate::surface::{HeightSample, Patch, SurfacePoint, smooth_normal};
+use crate::surface::{HeightSample, Patch, ShadingNormals, SurfacePoint, smooth_normal};
 
 /// Whether surfaces are seen as the ray's cone sees them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -94,14 +94,23 @@ impl Prisms {
         let tangents = patch.point_of(sample, u, v);
         let normal = tangents.du.cross(tangents.dv).as_vec3();
         let to_ray = footprint.direction * ng.dot(footprint.direction).signum();
+        let geometric_normal = turned(normal.normalize_or(ng), to_ray.normalize());
+        let shading_normal = match self.surface.shading_normals() {
+            ShadingNormals::Geometric => geometric_normal,
+            _ => {
+                let frames = self.surface.corner_frames(prim);
+                self.surface
+                    .shading_normal(&patch, frames.as_ref(), [sample; 2], u, v)
+            }
+        };
         SurfacePoint {
-            geometric_normal: turned(normal.normalize_or(ng), to_ray.normalize()),
-            shading_normal: smooth_normal::smooth_by(&patch, sample.gradient, u, v).as_vec3(),
+            geometric_normal,
+            shading_normal,
             ..point
         }
     }
 
-    /// Height and gradient of the map over a footprint; `None` where it is no wider than two texels.
+    /// Height and gradient of the map over a footprint; `None` where it is no wider than a texel.
     fn seen(
         &self,
         prim: u32,

@@ -18,6 +18,7 @@ mod light;
 mod material;
 mod sampler;
 mod shading;
+mod terminator;
 
 use std::ops::Range;
 use std::sync::Mutex;

@@ -353,10 +353,11 @@ impl Builder {
                 Some(map) => at.asset(e.named_by(&map.from)),
                 None => at.asset(e),
             })?;
-        displaced(name, mesh, (path, &map), displacement).map_err(|e| match e {
+        let surface = displaced(name, mesh, (path, &map), displacement).map_err(|e| match e {
             AssetError::Heights { .. } => at.asset(e),
             _ => file.asset(e),
-        })
+        })?;
+        Ok(surface.with_shading_normals(table.normals))
     }
 
     /// The index of the material that the scene names.

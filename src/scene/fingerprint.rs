@@ -78,6 +78,7 @@ impl Digest {
     fn surface(&mut self, surface: &DisplacedSurface) {
         self.mesh(surface.mesh());
         self.map(surface.map());
+        self.debug(&surface.shading_normals());
         self.debug(surface.displacement());
         self.debug(&surface.seams());
     }

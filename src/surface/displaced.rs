@@ -1,11 +1,14 @@
 //! The displaced surface S(b): a base mesh, a map, and what the map's heights mean.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{Affine2, DVec2, Vec2, Vec3};
 use thiserror::Error;
 
-use super::{BaseMesh, Corners, DisplacementMap, Patch, Seams, UvTransform, Wall, seams};
+use super::frames::{CornerFrames, Frames};
+use super::{
+    BaseMesh, Corners, DisplacementMap, Patch, Seams, ShadingNormals, UvTransform, Wall, seams,
+};
 use crate::ray::MAX_COORDINATE;
 
 /// How a map's heights become displacement: D = scale * (h - midlevel).
@@ -100,6 +103,9 @@ pub struct DisplacedSurface {
     pub(super) walls: Arc<[Wall]>,
     /// The UV transform, its sine and cosine taken once.
     uv: Affine2,
+    shading: ShadingNormals,
+    /// Made when the first smooth normal is asked for.
+    frames: OnceLock<Arc<Frames>>,
 }
 
 /// All a shader wants to know of a hit.
@@ -113,7 +119,7 @@ pub struct SurfacePoint {
     pub base_normal: Vec3,
     /// Unit geometric normal of S (its true tangent plane), on the base mesh's outer side.
     pub geometric_normal: Vec3,
-    /// Unit smooth normal: Ns' = Ns - Ng + N' (the paper, equations 18 and 26).
+    /// Unit normal to shade by: which one is the surface's [`ShadingNormals`].
     pub shading_normal: Vec3,
     /// Texture coordinates of the mesh, before any UV transform.
     pub texcoord: Vec2,
@@ -179,6 +185,8 @@ impl DisplacedSurface {
             seams: Seams::Open,
             walls: Arc::new([]),
             uv: uv.to_affine(),
+            shading: ShadingNormals::default(),
+            frames: OnceLock::new(),
         };
         surface.check_texels()?;
         Ok(surface)
@@ -222,10 +230,42 @@ impl DisplacedSurface {
         self
     }
 
-    /// The same over other vertices of the mesh: open seams only, for walls depend on normals.
-    pub(super) fn with_vertices(&self, positions: Vec<Vec3>, normals: Vec<Vec3>) -> Self {
+    /// The same surface with other normals to shade by; [`Self::new`] takes the smooth ones.
+    pub fn with_shading_normals(mut self, shading: ShadingNormals) -> Self {
+        self.shading = shading;
+        self
+    }
+
+    /// The normals that it is shaded by.
+    pub fn shading_normals(&self) -> ShadingNormals {
+        self.shading
+    }
+
+    /// The frames that smooth normals are made in.
+    pub(super) fn frames(&self) -> &Arc<Frames> {
+        self.frames.get_or_init(|| Arc::new(Frames::new(self)))
+    }
+
+    /// Those of a triangle's corners; `None` where normals are not made in frames.
+    pub(crate) fn corner_frames(&self, triangle: u32) -> Option<CornerFrames> {
+        (self.shading == ShadingNormals::Smooth).then(|| self.frames().of(triangle))
+    }
+
+    /// Bytes of these frames; 0 as long as no one has asked for a smooth normal.
+    pub fn frame_bytes(&self) -> usize {
+        self.frames.get().map_or(0, |frames| frames.bytes())
+    }
+
+    /// The same over other vertices of the mesh, and with frames of those: open seams only, for walls depend on normals.
+    pub(super) fn with_vertices(
+        &self,
+        positions: Vec<Vec3>,
+        normals: Vec<Vec3>,
+        frames: Option<Frames>,
+    ) -> Self {
         Self {
             mesh: Arc::new(self.mesh.with_vertices(positions, normals)),
+            frames: frames.map_or_else(OnceLock::new, |frames| Arc::new(frames).into()),
             ..self.clone()
         }
     }

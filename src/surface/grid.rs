@@ -88,16 +88,18 @@ impl HeightGrid {
         }
     }
 
-    /// A gradient without jumps at cell borders: central differences at the four texels around `p`, bilinear between them;
-    /// and the mean height of the four points that they are taken from.
-    pub fn smooth(&self, p: DVec2) -> HeightSample {
+    /// Central differences around `p` over `width` texels along each axis, and the mean height of the four points that they are taken from.
+    ///
+    /// The gradient has no jumps at cell borders: along its own axis it is the mean of the cells' slopes over `width`, across it the
+    /// bilinear slope has none.
+    pub fn smooth(&self, p: DVec2, width: f64) -> HeightSample {
+        let reach = 0.5 * width;
         let height = |dx: f64, dy: f64| self.sample(p + DVec2::new(dx, dy)).height;
-        let (right, left) = (height(1.0, 0.0), height(-1.0, 0.0));
-        let (above, below) = (height(0.0, 1.0), height(0.0, -1.0));
+        let (right, left) = (height(reach, 0.0), height(-reach, 0.0));
+        let (above, below) = (height(0.0, reach), height(0.0, -reach));
         HeightSample {
             height: 0.25 * ((right + left) + (above + below)),
-            // The bilinear interpolant of central differences is the central difference of the bilinear interpolant.
-            gradient: 0.5 * DVec2::new(right - left, above - below),
+            gradient: DVec2::new(right - left, above - below) / width,
         }
     }
 

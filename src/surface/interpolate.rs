@@ -3,7 +3,8 @@
 use glam::Vec3;
 use thiserror::Error;
 
-use super::{DisplacedSurface, Patch, SurfacePoint, smooth_normal};
+use super::frames::CornerFrames;
+use super::{DisplacedSurface, HeightSample, Patch, ShadingNormals, SurfacePoint, smooth_normal};
 
 /// A point of the displaced surface with its derivatives.
 ///
@@ -186,23 +187,44 @@ impl DisplacedSurface {
     fn with_derivatives(&self, prim: u32, u: f32, v: f32) -> Interpolated {
         match (prim as usize).checked_sub(self.mesh.triangles().len()) {
             Some(wall) => self.on_wall(wall, u, v),
-            None => self.on_triangle(&self.patch(prim), prim, u, v),
+            None => {
+                let frames = self.corner_frames(prim);
+                self.on_triangle(&self.patch(prim), frames.as_ref(), prim, u, v)
+            }
         }
     }
 
-    /// `patch` is that of `prim`, at some time.
-    pub(super) fn on_triangle(&self, patch: &Patch<'_>, prim: u32, u: f32, v: f32) -> Interpolated {
+    /// `patch` and `frames` are those of `prim`, at some time.
+    pub(super) fn on_triangle(
+        &self,
+        patch: &Patch<'_>,
+        frames: Option<&CornerFrames>,
+        prim: u32,
+        u: f32,
+        v: f32,
+    ) -> Interpolated {
         let [st0, st1, st2] = self.mesh.corner_texcoords(prim);
         let texcoord = st0 + u * (st1 - st0) + v * (st2 - st0);
         let (u, v) = (f64::from(u), f64::from(v));
-        let at = patch.point(u, v);
+        let own = self.map.sample(patch.texel(u, v));
+        let at = patch.point_of(own, u, v);
+        let geometric_normal = at.ng.normalize_or(patch.face_normal()).as_vec3();
+        let width = match self.shading_normals() {
+            ShadingNormals::Smooth => SMOOTH_WIDTH,
+            _ => PAPER_WIDTH,
+        };
+        let smooth = || self.map().smooth(patch.texel(u, v), width);
+        let shading_normal = match self.shading_normals() {
+            ShadingNormals::Geometric => geometric_normal,
+            _ => self.shading_normal(patch, frames, [smooth(), own], u, v),
+        };
         Interpolated {
             point: SurfacePoint {
                 position: at.position.as_vec3(),
                 base_position: patch.base(u, v).as_vec3(),
                 base_normal: unit_normal(patch, u, v),
-                geometric_normal: at.ng.normalize_or(patch.face_normal()).as_vec3(),
-                shading_normal: smooth_normal::smooth(patch, u, v).as_vec3(),
+                geometric_normal,
+                shading_normal,
                 texcoord,
                 displacement: at.displacement as f32,
                 tolerance: 0.0,
@@ -211,7 +233,29 @@ impl DisplacedSurface {
             dv: at.dv.as_vec3(),
         }
     }
+
+    /// The smooth normal for a smoothed height and gradient of the map there, and its own: in `frames` where they hold, else the paper's.
+    pub(crate) fn shading_normal(
+        &self,
+        patch: &Patch<'_>,
+        frames: Option<&CornerFrames>,
+        [sample, own]: [HeightSample; 2],
+        u: f64,
+        v: f64,
+    ) -> Vec3 {
+        let framed =
+            frames.and_then(|f| smooth_normal::framed(patch, f, sample, own.gradient, u, v));
+        framed
+            .unwrap_or_else(|| smooth_normal::paper(patch, sample.gradient, u, v))
+            .as_vec3()
+    }
 }
+
+/// Texels over which the slopes of smooth normals are taken: the least without jumps.
+const SMOOTH_WIDTH: f64 = 1.0;
+
+/// The same for the paper's: central differences of texels.
+const PAPER_WIDTH: f64 = 2.0;
 
 /// N of the base mesh.
 fn unit_normal(patch: &Patch<'_>, u: f64, v: f64) -> Vec3 {

@@ -220,10 +220,10 @@ impl DisplacementMap {
         self.grid.sample(p)
     }
 
-    /// A gradient without jumps at cell borders: central differences at the four texels around `p`, bilinear
-    /// between them. Per texel, like [`HeightSample::gradient`].
-    pub fn smooth_gradient(&self, p: DVec2) -> DVec2 {
-        self.grid.smooth(p).gradient
+    /// Height and gradient around `p` without jumps at cell borders: central differences over `width` texels, more than 0, along each
+    /// axis, and the mean height of the four points that they are taken from. Per texel, like [`HeightSample::gradient`].
+    pub fn smooth(&self, p: DVec2, width: f64) -> HeightSample {
+        self.grid.smooth(p, width)
     }
 }
 

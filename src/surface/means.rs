@@ -141,19 +141,22 @@ impl DisplacementMap {
     }
 
     /// Height and gradient around texel coordinates `p`, averaged over about `width` texels; `None` where that is no more
-    /// than the two that [`Self::smooth_gradient`] is taken over, or where there are no means.
+    /// than the one that smooth normals are taken over, or where there are no means.
     ///
     /// A central difference over two texels of a level is the mean slope between them, so levels are chosen by half the
     /// width, and two of them blended.
     pub fn averaged(&self, p: DVec2, width: f64) -> Option<HeightSample> {
         let levels = &self.means.get()?.levels;
-        if width.is_nan() || width <= 2.0 || levels.is_empty() {
+        if width.is_nan() || width <= 1.0 || levels.is_empty() {
             return None;
+        }
+        if width <= 2.0 {
+            return Some(self.grid.smooth(p, width));
         }
         let level = (0.5 * width).log2().min(levels.len() as f64);
         let finer = level.floor();
         let sample = |k: usize| match k.checked_sub(1) {
-            None => self.grid.smooth(p),
+            None => self.grid.smooth(p, 2.0),
             Some(k) => self.smooth_on(&levels[k], p),
         };
         let (a, part) = (sample(finer as usize), level - finer);
@@ -173,7 +176,7 @@ impl DisplacementMap {
             level.width as f64 / self.grid.width as f64,
             level.height as f64 / self.grid.height as f64,
         );
-        let sample = level.smooth((p + 0.5) * per - 0.5);
+        let sample = level.smooth((p + 0.5) * per - 0.5, 2.0);
         HeightSample {
             gradient: sample.gradient * per,
             ..sample

@@ -8,15 +8,16 @@
 //!
 //! is a displaced surface like any other: the one over the mesh as it stands then. D does not depend on the time.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 use thiserror::Error;
 
+use super::frames::{CornerFrames, Frames};
 use super::mesh::has_area;
 use super::{
     ClosestPoint, DisplacedSurface, InterpolateError, Interpolated, Patch, PointQuery, Seams,
-    TexelBox, normals,
+    ShadingNormals, TexelBox, normals,
 };
 use crate::ray::{MAX_COORDINATE, time_within};
 
@@ -96,6 +97,8 @@ pub struct MovingSurface {
     surface: Arc<DisplacedSurface>,
     /// The other steps, normals of unit length.
     later: Vec<TimeStep>,
+    /// Frames of the other steps, made when the first smooth normal is asked for.
+    later_frames: OnceLock<Vec<Frames>>,
 }
 
 /// Corners and unit vertex normals of a triangle.
@@ -127,7 +130,11 @@ impl MovingSurface {
         for (k, step) in later.iter_mut().enumerate() {
             step.finish(k + 1, &surface)?;
         }
-        Ok(Self { surface, later })
+        Ok(Self {
+            surface,
+            later,
+            later_frames: OnceLock::new(),
+        })
     }
 
     /// The surface at time 0.
@@ -191,6 +198,27 @@ impl MovingSurface {
         (at as usize, at.fract())
     }
 
+    /// The frames at the steps before and after a time; `None` where normals are not made in frames.
+    fn frames_around(&self, time: f32) -> Option<[&Frames; 2]> {
+        if self.surface.shading_normals() != ShadingNormals::Smooth {
+            return None;
+        }
+        let first = self.surface.frames();
+        let later = self.later_frames.get_or_init(|| {
+            let over = |s: &TimeStep| first.over(&self.surface, &s.positions, &s.normals);
+            self.later.iter().map(over).collect()
+        });
+        let at = |step: usize| step.checked_sub(1).map_or(&**first, |k| &later[k]);
+        let step = self.segment(time).0;
+        Some([at(step), at((step + 1).min(self.later.len()))])
+    }
+
+    /// Those of a triangle's corners.
+    fn corner_frames(&self, triangle: u32, time: f32) -> Option<CornerFrames> {
+        let [from, to] = self.frames_around(time)?;
+        Some(from.of_between(to, self.segment(time).1, triangle))
+    }
+
     /// The piece of the surface over one base triangle at a time.
     pub fn patch(&self, triangle: u32, time: f32) -> Patch<'_> {
         self.surface
@@ -208,6 +236,7 @@ impl MovingSurface {
                 .map(|(&a, &b)| position_between(a, b, part))
                 .collect(),
             normals.map(|(&a, &b)| normal_between(a, b, part)).collect(),
+            self.frames_around(time).map(|[a, b]| a.lerp(b, part)),
         )
     }
 
@@ -224,8 +253,9 @@ impl MovingSurface {
         time: f32,
     ) -> Result<Interpolated, InterpolateError> {
         self.surface.checked(0, prim, u, v, || {
+            let frames = self.corner_frames(prim, time);
             self.surface
-                .on_triangle(&self.patch(prim, time), prim, u, v)
+                .on_triangle(&self.patch(prim, time), frames.as_ref(), prim, u, v)
         })
     }
 

@@ -7,7 +7,7 @@ use glam::{Affine3A, EulerRot, Quat, Vec3};
 use super::{Item, Keyed, STEP_TEXELS, SceneError, channel, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
 use crate::prism::{EditBounds, Lod, March, PrismOptions, Step};
-use crate::surface::{Projection, Seams, UvTransform, Wrap};
+use crate::surface::{Projection, Seams, ShadingNormals, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
 pub(in crate::scene) const SCALE: &str =
@@ -58,6 +58,7 @@ pub(in crate::scene) struct DisplacementTable {
     pub nodata: Option<f32>,
     pub uv: Option<UvTransform>,
     pub prisms: PrismOptions,
+    pub normals: ShadingNormals,
     /// Default: what the material needs.
     pub seams: Option<Seams>,
 }
@@ -131,11 +132,13 @@ impl DisplacementTable {
             "jitter",
             "edit_bounds",
             "lod",
+            "normals",
             "seams",
         ])?;
         let march = march(&mut section)?;
         let words = [EditBounds::Tight, EditBounds::Range].map(|b| (b.name(), b));
         let edit_bounds = section.optional("edit_bounds", |i| i.word(&words))?;
+        let normals = ShadingNormals::ALL.map(|n| (n.name(), n));
         Ok(Self {
             this,
             map: section.optional("map", |i| file_path(&i, folder))?,
@@ -150,6 +153,9 @@ impl DisplacementTable {
                 edit_bounds: edit_bounds.unwrap_or_default(),
                 lod: lod(&mut section, march)?,
             },
+            normals: section
+                .optional("normals", |i| i.word(&normals))?
+                .unwrap_or_default(),
             seams: seams(&mut section, march)?,
         })
     }

@@ -101,25 +101,17 @@ fn white_bodies_vanish_in_a_white_world() {
                 Shape::Triangles(built(ball(1.0)))
             };
             let mut scene = Scene::new(vec![(shape, material.clone())], vec![]);
-            scene.facetted = true;
-            let mean = scene.mean(long(), 1500, at_ball);
-            // 1500 samples with a spread of at most 0.3 per sample: 4 standard deviations, and the tables' 1 %.
-            assert!(
-                mean.abs_diff_eq(Vec3::ONE, 0.03),
-                "{name}, displaced: {displaced}: {mean}"
-            );
+            // 6000 samples with a spread of at most 0.2 per sample are 3 standard deviations within 0.008.
+            for (facetted, least) in [(true, 0.99), (false, 0.97)] {
+                scene.facetted = facetted;
+                let mean = scene.mean(long(), 6000, at_ball);
+                assert!(
+                    mean.min_element() > least && mean.max_element() < 1.01,
+                    "{name}, displaced: {displaced}, facetted: {facetted}: {mean}"
+                );
+            }
         }
     }
-}
-
-#[test]
-fn the_smooth_normal_darkens_a_white_body_by_little() {
-    let scene = Scene::new(vec![(displaced_ball(0.9, 0.1, waves), white())], vec![]);
-    let mean = scene.mean(long(), 1500, at_ball);
-    assert!(
-        mean.min_element() > 0.9 && mean.max_element() < 1.03,
-        "{mean}"
-    );
 }
 
 #[test]

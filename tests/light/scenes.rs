@@ -1,0 +1,222 @@
+//! Surfaces of ordinary and of hard relief, each under lights of every kind, as prismarch renders them.
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+use prismarch::bvh::BvhTracer;
+use prismarch::prism::{March, Prisms};
+use prismarch::render::film::{Frame, Objects};
+use prismarch::render::{Control, RenderInput, render_frame};
+use prismarch::scene::{
+    AovSet, Camera, Color, Film, Integrator, Light, Material, PathLimits, Scalar,
+};
+use prismarch::surface::{
+    DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, ShadingNormals,
+    Texels, Wrap,
+};
+use prismarch::trace::{Object, Placement, Shape, World};
+
+/// One displaced surface, and where it is seen from.
+pub struct Case {
+    pub name: &'static str,
+    pub surface: DisplacedSurface,
+    pub eye: Vec3,
+    /// Vertical, radians.
+    pub fov: f32,
+}
+
+/// Pixels along a picture's side.
+pub const SIDE: u32 = 48;
+
+/// A number in [0, 1) of a place (PCG hash).
+fn hash(x: u32) -> u32 {
+    let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+/// `n` x `n` texels that have nothing to do with each other.
+fn noise(n: usize) -> Vec<u16> {
+    (0..n * n).map(|i| hash(i as u32) as u16).collect()
+}
+
+/// `n` x `n` texels of a few waves: a soft map that repeats.
+fn soft(n: usize) -> Vec<u16> {
+    let tau = std::f32::consts::TAU / n as f32;
+    let at = |i: usize| {
+        let (x, y) = (tau * (i % n) as f32, tau * (i / n) as f32);
+        let h = (3.0 * x + (2.0 * y).sin()).sin()
+            + (4.0 * y - 2.0 * x).cos()
+            + 0.5 * (9.0 * x).sin() * (7.0 * y).cos();
+        ((h / 2.5 * 0.5 + 0.5) * 65535.0) as u16
+    };
+    (0..n * n).map(at).collect()
+}
+
+/// The same surface as `texels` of `n` x `n` in `times` as many texels, which repeat.
+fn upsampled(texels: &[u16], n: usize, times: usize) -> Vec<u16> {
+    let map = DisplacementMap::new(n, n, Texels::U16(texels.to_vec()), Wrap::Repeat).unwrap();
+    let m = n * times;
+    let at = |i: usize| {
+        let st = Vec2::new((i % m) as f32 + 0.5, (i / m) as f32 + 0.5) / m as f32;
+        (map.height(st) * 65535.0).round() as u16
+    };
+    (0..m * m).map(at).collect()
+}
+
+/// A square of 2 x 2 around the origin, facing up.
+fn plane() -> MeshBuilder {
+    let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+    let position = |c: Vec2| Vec3::new(2.0 * c.x - 1.0, 0.0, 1.0 - 2.0 * c.y);
+    MeshBuilder {
+        positions: corners.map(position).to_vec(),
+        normals: vec![Vec3::Y; 4],
+        texcoords: corners.to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    }
+}
+
+/// A unit sphere of `across` times `up` faces with the normals of the sphere.
+fn sphere(across: u32, up: u32) -> MeshBuilder {
+    let mut mesh = MeshBuilder::default();
+    for j in 0..=up {
+        for i in 0..=across {
+            let (s, t) = (i as f32 / across as f32, j as f32 / up as f32);
+            let (longitude, latitude) =
+                (std::f32::consts::TAU * s, std::f32::consts::PI * (t - 0.5));
+            // The first and the last meridian are the same to the bit.
+            let longitude = if i == across { 0.0 } else { longitude };
+            let p = Vec3::new(
+                longitude.sin() * latitude.cos(),
+                latitude.sin(),
+                longitude.cos() * latitude.cos(),
+            );
+            mesh.positions.push(p);
+            mesh.normals.push(p.normalize());
+            mesh.texcoords.push(Vec2::new(s, t));
+            if i < across && j < up {
+                let a = j * (across + 1) + i;
+                let (b, c, d) = (a + 1, a + across + 2, a + across + 1);
+                if j > 0 {
+                    mesh.triangles.push([a, b, c]);
+                }
+                if j + 1 < up {
+                    mesh.triangles.push([a, c, d]);
+                }
+            }
+        }
+    }
+    mesh
+}
+
+fn surface(mesh: MeshBuilder, n: usize, texels: Vec<u16>, scale: f32) -> DisplacedSurface {
+    let (mesh, _) = mesh.build(NormalMode::File).unwrap();
+    let map = DisplacementMap::new(n, n, Texels::U16(texels), Wrap::Repeat).unwrap();
+    DisplacedSurface::new(Arc::new(mesh), Arc::new(map), Displacement::new(scale)).unwrap()
+}
+
+pub fn cases() -> Vec<Case> {
+    let above = |name, surface| Case {
+        name,
+        surface,
+        eye: Vec3::new(1.2, 2.6, 2.2),
+        fov: 0.5,
+    };
+    let around = |name, surface| Case {
+        name,
+        surface,
+        eye: Vec3::new(1.2, 2.6, 4.2),
+        fov: 0.45,
+    };
+    vec![
+        above("flat, noise", surface(plane(), 64, noise(64), 0.05)),
+        above(
+            "flat, noise upsampled 16x",
+            surface(plane(), 1024, upsampled(&noise(64), 64, 16), 0.05),
+        ),
+        above("flat, soft", surface(plane(), 128, soft(128), 0.2)),
+        around("curved, noise", surface(sphere(32, 16), 64, noise(64), 0.1)),
+        around("curved, soft", surface(sphere(32, 16), 128, soft(128), 0.2)),
+        around("coarse, soft", surface(sphere(10, 5), 128, soft(128), 0.2)),
+        around("coarse, none", surface(sphere(10, 5), 128, soft(128), 1e-4)),
+    ]
+}
+
+/// The lights of the comparison.
+pub fn lights() -> Vec<(&'static str, Vec<Light>)> {
+    let sun = |name, direction: Vec3| {
+        let direction = direction.normalize();
+        let irradiance = Vec3::splat(3.0);
+        (
+            name,
+            vec![Light::Directional {
+                direction,
+                irradiance,
+            }],
+        )
+    };
+    vec![
+        ("environment", vec![]),
+        sun("sun in front", Vec3::new(0.6, 0.7, 0.4)),
+        sun("sun aside", Vec3::new(-0.8, 0.4, 0.3)),
+        sun("sun behind", Vec3::new(-0.3, 0.4, -0.8)),
+    ]
+}
+
+/// The mean radiance of a case's picture over what is hit, by normals of a kind.
+pub fn mean(
+    case: &Case,
+    lights: &[Light],
+    normals: ShadingNormals,
+    material: &Material,
+    spp: u32,
+) -> f64 {
+    let surface = case.surface.clone().with_shading_normals(normals);
+    let prisms = Prisms::new(Arc::new(surface), March::Exact).unwrap();
+    let world = World::new(vec![Object {
+        shape: Shape::Displaced(Arc::new(prisms)),
+        placement: Placement::World,
+        mask: u32::MAX,
+    }]);
+    let tracer = BvhTracer::new(&world).unwrap();
+    let camera = Camera {
+        position: case.eye,
+        target: Vec3::ZERO,
+        ..Camera::default()
+    };
+    let film = Film {
+        width: SIDE,
+        height: SIDE,
+        spp,
+        aovs: AovSet::NONE,
+        ..Film::default()
+    };
+    let integrator = Integrator::Path(PathLimits {
+        diffuse: 100,
+        glossy: 100,
+        transmission: 100,
+        roulette: 4,
+    });
+    let input = RenderInput {
+        tracer: &tracer,
+        surfaces: &world,
+        camera: &camera,
+        film: &film,
+        materials: std::slice::from_ref(material),
+        object_materials: &[0],
+        lights,
+        integrator: &integrator,
+    };
+    let mut frame = Frame::new(&film, 0..film.spp, Objects::default());
+    render_frame(&input, &mut frame, Control::default());
+    let pixels = frame.radiance();
+    pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / pixels.len() as f64
+}
+
+pub fn chalk(albedo: f32) -> Material {
+    Material {
+        base_color: Color::Constant(Vec3::splat(albedo)),
+        specular: Scalar::Constant(0.0),
+        ..Material::default()
+    }
+}
