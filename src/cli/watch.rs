@@ -79,7 +79,9 @@ impl Watched<'_> {
             if let (Some(viewer), Some(stream)) = (&viewer, &self.viewer) {
                 scope.spawn(|| {
                     if let Err(lost) = viewer.send(stream) {
-                        progress.warn(&format!("the viewer is gone (--tev): {lost}"));
+                        progress.warn(&format!(
+                            "the viewer gets no more of the picture (--tev): {lost}"
+                        ));
                     }
                 });
             }
