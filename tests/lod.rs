@@ -280,7 +280,7 @@ fn picture(surface: &Arc<DisplacedSurface>, lod: Lod, spp: u32) -> Picture {
         lights: &[sun],
         integrator: &Integrator::Beauty,
     };
-    render(&input, &|_, _| {})
+    render(&input, &|_| {})
 }
 
 /// Root of the mean square difference, as a part of the mean of `b`.

@@ -9,6 +9,7 @@ use super::film::FilmArgs;
 use super::march::MarchArgs;
 use super::picture::Target;
 use super::render::Job;
+use super::watch::WatchArgs;
 use crate::demo::{DEMOS, Demo, WriteOptions, digest};
 use crate::files::Outputs;
 use crate::scene::load::LoadOptions;
@@ -101,6 +102,7 @@ fn render(args: &Args, scene: &Path, picture: &Path) -> Result<(), CliError> {
         samples: None,
         resume: false,
         march: &MarchArgs::default(),
+        watch: &WatchArgs::default(),
         stats: None,
         engine: &args.engine,
         quiet: args.quiet,

@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::interrupt::EXIT_BASE;
 use super::rays::RayError;
+use super::tev::Address;
 use crate::demo::WriteDemoError;
 use crate::files::OutputError;
 use crate::prism::MarchError;
@@ -83,6 +84,16 @@ pub enum CliError {
         /// Its ending.
         found: String,
     },
+    /// Nobody takes the picture while it renders.
+    #[error(
+        "cannot reach a viewer at {address} (--tev): {source}; expected a tev that listens there"
+    )]
+    Viewer {
+        /// Where it was looked for.
+        address: Address,
+        /// What the system said.
+        source: io::Error,
+    },
     /// A demo's files.
     #[error(transparent)]
     Demo(#[from] WriteDemoError),
@@ -121,7 +132,7 @@ impl CliError {
             Self::Backend { .. } | Self::Threads { .. } | Self::Signals(_) => FAILED,
             // Signals are small numbers.
             Self::Interrupted { signal, .. } => (EXIT_BASE + signal) as u8,
-            Self::Output(_) | Self::Demo(_) | Self::Stdout(_) => OUTPUT,
+            Self::Output(_) | Self::Viewer { .. } | Self::Demo(_) | Self::Stdout(_) => OUTPUT,
             Self::ReaderGone => 0,
         }
     }

@@ -16,11 +16,14 @@ mod memory;
 mod merge;
 mod parse;
 mod picture;
+mod preview;
 mod progress;
 mod query;
 mod rays;
 mod render;
 mod stats;
+mod tev;
+mod watch;
 
 use std::process::ExitCode;
 

@@ -1,6 +1,7 @@
 //! Values of options, checked as they are parsed.
 
 use std::ops::Range;
+use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::UVec2;
@@ -138,6 +139,14 @@ pub fn spread(text: &str) -> Result<f32, String> {
     number.ok_or_else(|| "expected radians from 0 to 1".into())
 }
 
+/// A pause between two looks at something.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    let number = finite(text).ok().filter(|x| (0.1..=86_400.0).contains(x));
+    number.map(Duration::from_secs_f32).ok_or_else(|| {
+        "expected seconds from 0.1 to 86400; a scene file goes before --preview".into()
+    })
+}
+
 /// A length above zero.
 pub fn length(text: &str) -> Result<f32, String> {
     let number = finite(text).ok().filter(|&x| x > 0.0);
@@ -224,6 +233,10 @@ mod tests {
         assert_eq!(texels("0.25"), Ok(0.25));
         assert!(texels("0").is_err() && texels("-1").is_err() && texels("1e-9").is_err());
         assert_eq!(length("1e-3"), Ok(1e-3));
+        assert_eq!(seconds("0.5"), Ok(Duration::from_millis(500)));
+        for bad in ["", "0", "-1", "nan", "86401", "3s", "scene.toml"] {
+            assert!(seconds(bad).is_err(), "{bad}");
+        }
         assert!(length("0").is_err() && length("nan").is_err());
     }
 }

@@ -1,9 +1,9 @@
 //! `prismarch render`: a scene file becomes a picture.
 
 use std::io::Write;
+use std::net::TcpStream;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::builder::PossibleValuesParser;
 
@@ -16,11 +16,11 @@ use super::march::MarchArgs;
 use super::memory::Memory;
 use super::parse;
 use super::picture::Target;
-use super::progress::Progress;
 use super::stats::{Clock, Seconds, Stats};
+use super::watch::{WatchArgs, Watched};
 use crate::files::Outputs;
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
-use crate::render::{Control, Outcome, RenderInput};
+use crate::render::{Outcome, RenderInput};
 use crate::scene::load::LoadOptions;
 use crate::scene::{Aov, AovSet, Film, Integrator, Loaded, Scene, View};
 use crate::trace::World;
@@ -38,6 +38,8 @@ Examples:
   prismarch render scene.toml -o left.exr --crop 0,0,320,480
   prismarch render scene.toml -o second.exr --samples 16..32 --spp 64
   prismarch render scene.toml -o rock.exr --resume
+  prismarch render scene.toml -o rock.png --preview
+  prismarch render scene.toml -o rock.exr --preview 30 --tev 192.168.1.20:14158
   prismarch render scene.toml --march uniform --dt 0.5
   prismarch render scene.toml --lod cone --spp 1
   prismarch render scene.toml --backend bvh --threads 4 --stats stats.json --quiet")]
@@ -65,6 +67,8 @@ pub struct Args {
     resume: bool,
     #[command(flatten)]
     march: MarchArgs,
+    #[command(flatten)]
+    watch: WatchArgs,
     /// Write times, ray counts and memory as JSON
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
@@ -101,6 +105,8 @@ pub struct Job<'a> {
     pub resume: bool,
     /// Marches that win over the scene's.
     pub march: &'a MarchArgs,
+    /// What is seen of it meanwhile.
+    pub watch: &'a WatchArgs,
     /// Where the statistics go.
     pub stats: Option<&'a Path>,
     /// Backend and threads; the threads are started.
@@ -134,6 +140,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         samples: args.samples.clone(),
         resume: args.resume,
         march: &args.march,
+        watch: &args.watch,
         stats: args.stats.as_deref(),
         engine: &args.engine,
         quiet: args.quiet,
@@ -145,10 +152,12 @@ impl Job<'_> {
     /// Loads, builds, renders, writes, and says so in one line.
     pub fn run(mut self) -> Result<(), CliError> {
         let mut clock = Clock::start();
+        let viewer = self.watch.connect()?;
         let mut loaded = Loaded::from_file_with(self.scene, self.set, self.load)?;
         self.spare(&loaded.files)?;
         super::warn(&loaded.warnings);
         self.film.apply(&mut loaded.scene.film)?;
+        loaded.scene.film.progressive |= self.watch.preview.is_some();
         if let Some(integrator) = self.integrator.and_then(Integrator::named) {
             loaded.scene.integrator = integrator;
         }
@@ -164,7 +173,7 @@ impl Job<'_> {
         begun.info.backend = engine.tracer().name();
         let build = clock.lap();
         let interrupt = Interrupt::catch()?;
-        let outcome = self.render(&loaded, &world, &*engine, &mut begun, &interrupt)?;
+        let outcome = self.render(&loaded, &world, &*engine, &mut begun, &interrupt, viewer)?;
         engine.check()?;
         let render = clock.lap();
         let FrameFile { frame, info } = &mut begun;
@@ -296,6 +305,7 @@ impl Job<'_> {
         engine: &dyn Engine,
         begun: &mut FrameFile,
         interrupt: &Interrupt,
+        viewer: Option<TcpStream>,
     ) -> Result<Outcome, CliError> {
         let scene = &loaded.scene;
         let object_materials: Vec<usize> = scene.objects.iter().map(|o| o.material).collect();
@@ -315,25 +325,17 @@ impl Job<'_> {
         {
             return Err(error.into());
         }
-        let progress = Progress::new(self.quiet);
-        let broken = AtomicBool::new(false);
-        let mut error = None;
         let FrameFile { frame, info } = begun;
-        let mut show = |frame: &Frame| {
-            if let Err(failed) = self.target.write(frame, info, &scene.film) {
-                broken.store(true, Ordering::Relaxed);
-                error = Some(failed);
-            }
-        };
-        let control = Control {
-            progress: &|done, total| progress.report(done, total),
-            stop: &|| interrupt.signal().is_some() || broken.load(Ordering::Relaxed),
-            pass: Some(&mut show),
-            tile: None,
-        };
-        let outcome = crate::render::render_frame(&input, frame, control);
-        progress.finish();
-        error.map_or(Ok(outcome), Err)
+        Watched {
+            input,
+            interrupt,
+            quiet: self.quiet,
+            write: &|frame| self.target.write(frame, info, &scene.film),
+            preview: self.watch.preview,
+            viewer,
+            name: self.target.path(),
+        }
+        .render(frame)
     }
 
     fn say(&self, line: &str) -> Result<(), CliError> {

@@ -18,6 +18,7 @@ mod light;
 mod material;
 mod sampler;
 mod shading;
+mod status;
 mod terminator;
 
 use std::ops::Range;
@@ -28,6 +29,7 @@ use rayon::prelude::*;
 
 pub use film::to_srgb8;
 pub use integrator::RayCounts;
+pub use status::Status;
 
 use crate::ray::{Cone, Ray};
 use crate::scene::{Camera, Film, Integrator, Light, Material};
@@ -142,13 +144,12 @@ pub struct RenderStats {
 
 /// Renders the film's crop window by the scene's integrator, all samples.
 ///
-/// Runs on the current rayon pool. `progress` is called with (tiles done, tiles in all), once per finished tile
-/// and in order, from any thread of the pool.
+/// Runs on the current rayon pool. `progress` is called once per finished tile and in order, from any thread of the pool.
 ///
 /// # Panics
 /// When an object's material index is out of range, or a hit names an object the world does not have: a
 /// loaded scene and its own tracer never do.
-pub fn render(input: &RenderInput, progress: &(dyn Fn(usize, usize) + Sync)) -> Picture {
+pub fn render(input: &RenderInput, progress: &(dyn Fn(&Status) + Sync)) -> Picture {
     let film = input.film;
     let mut frame = Frame::new(film, 0..film.spp, Objects::default());
     let control = Control {
@@ -176,8 +177,10 @@ impl Picture {
 
 /// How a run is watched and stopped.
 pub struct Control<'a> {
-    /// Called with (tiles done, tiles in all), once per finished tile and in order, from any thread.
-    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+    /// Called once per finished tile and in order, from any thread; no other tile is put into the picture meanwhile.
+    pub progress: &'a (dyn Fn(&Status) + Sync),
+    /// Called with every tile, finished or stopped, before it is put into the picture, from any thread and in no order.
+    pub tile_done: &'a (dyn Fn(&Frame) + Sync),
     /// Asked before every sample, from any thread; what is done stays when it says true.
     pub stop: &'a (dyn Fn() -> bool + Sync),
     /// Called between two passes.
@@ -190,7 +193,8 @@ impl Default for Control<'_> {
     /// Neither watched nor stopped.
     fn default() -> Self {
         Self {
-            progress: &|_, _| (),
+            progress: &|_| (),
+            tile_done: &|_| (),
             stop: &|| false,
             pass: None,
             tile: None,
@@ -221,15 +225,15 @@ pub fn render_frame(input: &RenderInput, frame: &mut Frame, mut control: Control
         TileGrid::new(frame.window(), side)
     });
     let grids: Vec<TileGrid> = grids.collect();
-    let total = grids.iter().map(TileGrid::len).sum();
+    let total = frame.lacks(frame.samples());
     let mut outcome = Outcome {
         rays: RayCounts::default(),
         stopped: false,
     };
-    let mut before = 0;
-    for (pass, grid) in passes.iter().zip(&grids) {
-        let (progress, stop) = (control.progress, control.stop);
-        let assembly = Mutex::new((&mut *frame, &mut outcome, before));
+    let mut done = 0;
+    for (number, (pass, grid)) in (1..).zip(passes.iter().zip(&grids)) {
+        let (progress, tile_done, stop) = (control.progress, control.tile_done, control.stop);
+        let assembly = Mutex::new((&mut *frame, &mut outcome, &mut done));
         (0..grid.len())
             .into_par_iter()
             .with_max_len(1)
@@ -238,23 +242,31 @@ pub fn render_frame(input: &RenderInput, frame: &mut Frame, mut control: Control
                 let Ok(mut tile) = assembly.lock().map(|a| a.0.part(grid.tile(index))) else {
                     return;
                 };
+                let lacked = tile.lacks(pass);
                 let result = renderer.render(&mut tile, pass.end, stop);
+                tile_done(&tile);
                 if let Ok(mut assembly) = assembly.lock() {
                     let (frame, outcome, done) = &mut *assembly;
                     frame.place(&tile);
                     outcome.rays += result.rays;
                     outcome.stopped |= result.stopped;
                     if !result.stopped {
-                        *done += 1;
-                        progress(*done, total);
+                        **done += lacked;
+                        progress(&Status {
+                            frame,
+                            done: **done,
+                            total,
+                            pass: number,
+                            passes: passes.len(),
+                            rays: outcome.rays,
+                        });
                     }
                 }
             });
         if outcome.stopped {
             break;
         }
-        before += grid.len();
-        if let Some(pass) = control.pass.as_mut().filter(|_| before < total) {
+        if let Some(pass) = control.pass.as_mut().filter(|_| number < passes.len()) {
             pass(frame);
         }
     }

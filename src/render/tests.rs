@@ -339,13 +339,25 @@ fn seeds_differ() {
 }
 
 #[test]
-fn progress_counts_every_tile_in_order() {
+fn progress_counts_the_samples_of_every_tile_in_order() {
     let scene = Setup::new(false, material(0.0, 1.0, 0.0), vec![]);
     let seen = Mutex::new(Vec::new());
-    let picture = render(&scene.input(), &|done, total| {
-        seen.lock().unwrap().push((done, total))
+    let picture = render(&scene.input(), &|status| {
+        seen.lock().unwrap().push((
+            status.done,
+            status.total,
+            status.rays.camera,
+            status.frame.taken(),
+        ));
     });
-    assert_eq!(*seen.lock().unwrap(), [(1, 2), (2, 2)]);
+    let tiles = [32 * 30 * 4, 13 * 30 * 4];
+    let whole: u64 = tiles.iter().sum();
+    let seen = seen.into_inner().unwrap();
+    assert!(tiles.contains(&seen[0].0));
+    assert_eq!(seen[1].0, whole);
+    assert!(seen.iter().all(|&(done, total, camera, taken)| {
+        total == whole && done == camera && done == taken
+    }));
     assert_eq!((picture.width, picture.height), (45, 30));
-    assert_eq!(picture.stats.rays.camera, 45 * 30 * 4);
+    assert_eq!(picture.stats.rays.camera, whole);
 }

@@ -140,6 +140,15 @@ impl Frame {
         self.counts.iter().map(|c| u64::from(c.taken())).sum()
     }
 
+    /// Samples of these numbers that pixels have not got, over all pixels; those that converged pixels will not get are among them.
+    pub fn lacks(&self, samples: &Range<u32>) -> u64 {
+        let lack = |counts: &Counts| {
+            let next = self.samples.start + counts.taken();
+            u64::from(samples.end.saturating_sub(next.max(samples.start)))
+        };
+        self.counts.iter().map(lack).sum()
+    }
+
     /// Samples that were NaN or infinite.
     pub fn dropped(&self) -> u64 {
         self.counts.iter().map(|c| u64::from(c.dropped)).sum()

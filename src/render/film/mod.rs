@@ -20,6 +20,7 @@ mod merge;
 mod objects;
 mod pixel;
 mod sample;
+mod shown;
 mod slot;
 mod tile;
 mod tone;

@@ -79,6 +79,53 @@ fn a_progressive_film_is_shown_after_every_pass() {
 }
 
 #[test]
+fn tiles_are_shown_before_they_are_placed_and_work_is_counted_to_its_end() {
+    let mut scene = busy();
+    scene.film.spp = 64;
+    scene.film.progressive = true;
+    scene.film.adaptive = Some(Adaptive {
+        threshold: 0.25,
+        min_spp: 8,
+    });
+    let whole = Frame::new(&scene.film, 0..64, Objects::default());
+    let (mut frame, shown) = (whole.clone(), Mutex::new(whole));
+    // Stopped once, in the middle.
+    for most in [20_000, u32::MAX] {
+        let last = Mutex::new((0, 0, 0));
+        let left = std::sync::atomic::AtomicU32::new(most);
+        let lacked = frame.lacks(&(0..64));
+        let control = Control {
+            stop: &|| left.fetch_sub(1, std::sync::atomic::Ordering::Relaxed) < 2,
+            tile_done: &|tile| shown.lock().unwrap().place(tile),
+            progress: &|status| {
+                let mut last = last.lock().unwrap();
+                assert!(status.done >= last.0);
+                assert_eq!((status.total, status.passes), (lacked, 7));
+                *last = (status.done, status.total, status.pass);
+            },
+            ..Control::default()
+        };
+        let outcome = render_frame(&scene.input(), &mut frame, control);
+        assert_eq!(outcome.stopped, most != u32::MAX);
+        assert!(shown.lock().unwrap().radiance() == frame.radiance());
+        let (done, total, pass) = *last.lock().unwrap();
+        assert_eq!((done, pass) == (total, 7), !outcome.stopped);
+    }
+}
+
+#[test]
+fn a_viewer_is_shown_what_an_exr_file_has() {
+    let mut scene = busy();
+    let frame = scene.frame(0..4);
+    let names = "R G B A albedo.R albedo.G albedo.B N.X N.Y N.Z";
+    assert_eq!(frame.shown_channels().join(" "), names);
+    let (values, radiance) = (frame.shown_values(), frame.radiance());
+    assert!(values.chunks(10).map(Vec3::from_slice).eq(radiance));
+    scene.film.aovs = AovSet::NONE;
+    assert_eq!(scene.frame(0..1).shown_channels().join(" "), "R G B A");
+}
+
+#[test]
 fn all_filters_converge_to_the_same_mean() {
     let mean = |shape| {
         let mut scene = Setup::new(false, material(0.0, 1.0, 0.0), vec![uniform_environment()]);
