@@ -8,7 +8,6 @@ mod check;
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use super::super::draco::Compressed;
@@ -25,7 +24,7 @@ pub(super) struct Document {
     pub extensions_required: Vec<String>,
     scene: Option<usize>,
     #[serde(default)]
-    scenes: Vec<Scene>,
+    pub scenes: Vec<Scene>,
     #[serde(default)]
     pub nodes: Vec<Node>,
     #[serde(default)]
@@ -47,9 +46,10 @@ pub(super) struct Document {
     #[serde(default)]
     pub samplers: Vec<Sampler>,
     #[serde(default)]
-    animations: Vec<Animation>,
+    pub animations: Vec<Animation>,
     #[serde(default)]
-    cameras: Vec<IgnoredAny>,
+    pub cameras: Vec<Camera>,
+    extensions: Option<DocumentExtensions>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -60,7 +60,81 @@ struct Asset {
 }
 
 #[derive(Debug, Deserialize)]
-struct Scene {
+struct DocumentExtensions {
+    #[serde(rename = "KHR_lights_punctual")]
+    lights: Option<Lights>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Lights {
+    #[serde(default)]
+    lights: Vec<Light>,
+}
+
+/// A light of KHR_lights_punctual.
+#[derive(Debug, Deserialize)]
+pub(super) struct Light {
+    pub name: Option<Box<str>>,
+    #[serde(rename = "type")]
+    pub kind: Box<str>,
+    #[serde(default = "white")]
+    pub color: [f32; 3],
+    #[serde(default = "one")]
+    pub intensity: f32,
+    pub range: Option<f32>,
+    pub spot: Option<Spot>,
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+/// Half angles of a cone, radians.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Spot {
+    pub inner_cone_angle: f32,
+    pub outer_cone_angle: f32,
+}
+
+impl Default for Spot {
+    fn default() -> Self {
+        Self {
+            inner_cone_angle: 0.0,
+            outer_cone_angle: std::f32::consts::FRAC_PI_4,
+        }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Camera {
+    pub name: Option<Box<str>>,
+    #[serde(rename = "type")]
+    pub kind: Box<str>,
+    pub perspective: Option<Perspective>,
+    pub orthographic: Option<Orthographic>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Perspective {
+    pub yfov: f32,
+    pub aspect_ratio: Option<f32>,
+}
+
+/// Half of what is seen across and up.
+#[derive(Debug, Deserialize)]
+pub(super) struct Orthographic {
+    pub xmag: f32,
+    pub ymag: f32,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Scene {
     #[serde(default)]
     nodes: Vec<usize>,
 }
@@ -72,7 +146,7 @@ pub(super) struct Node {
     pub children: Box<[u32]>,
     pub mesh: Option<u32>,
     pub skin: Option<u32>,
-    camera: Option<u32>,
+    pub camera: Option<u32>,
     pub weights: Option<Box<[f32]>>,
     pub matrix: Option<Box<[f32; 16]>>,
     pub translation: Option<Box<[f32; 3]>>,
@@ -87,6 +161,13 @@ struct NodeExtensions {
     instancing: Option<Instancing>,
     #[serde(rename = "KHR_node_visibility")]
     visibility: Option<Visibility>,
+    #[serde(rename = "KHR_lights_punctual")]
+    light: Option<LightOfNode>,
+}
+
+#[derive(Debug, Deserialize)]
+struct LightOfNode {
+    light: usize,
 }
 
 /// EXT_mesh_gpu_instancing: accessors by attribute.
@@ -297,11 +378,12 @@ pub(super) struct Image {
 pub(super) struct Sampler {
     pub wrap_s: Option<u32>,
     pub wrap_t: Option<u32>,
+    pub mag_filter: Option<u32>,
 }
 
 /// Not played, but its indices must lead somewhere as all others.
 #[derive(Debug, Deserialize)]
-struct Animation {
+pub(super) struct Animation {
     #[serde(default)]
     channels: Vec<Channel>,
     #[serde(default)]
@@ -360,6 +442,12 @@ impl Document {
         scenes.flat_map(|(index, scene)| scene.nodes.iter().map(move |&node| (index, node)))
     }
 
+    /// Those of KHR_lights_punctual.
+    pub fn lights(&self) -> &[Light] {
+        let extension = self.extensions.as_ref().and_then(|e| e.lights.as_ref());
+        extension.map_or(&[], |lights| &lights.lights)
+    }
+
     /// Whether the file says that it uses an extension.
     pub fn uses(&self, extension: &str) -> bool {
         self.extensions_used.iter().any(|name| name == extension)
@@ -369,6 +457,11 @@ impl Document {
 impl Node {
     pub fn instancing(&self) -> Option<&Instancing> {
         self.extensions.as_ref()?.instancing.as_ref()
+    }
+
+    /// The light that it places.
+    pub fn light(&self) -> Option<usize> {
+        Some(self.extensions.as_ref()?.light.as_ref()?.light)
     }
 
     /// KHR_node_visibility: an invisible node hides all below it, too.
