@@ -39,9 +39,9 @@ pub enum FileLightKind {
         direction: Vec3,
         /// As of a point.
         range: f32,
-        /// Half angles, radians, 0 <= inner < outer <= pi / 2: where it is gone, and within which it is full.
+        /// Half angle where it is gone, radians, up to pi / 2.
         outer: f32,
-        /// Within it the light is full.
+        /// Half angle within which it is full, at least 0 and below `outer`.
         inner: f32,
     },
 }
@@ -94,7 +94,7 @@ impl FileLight {
         })
     }
 
-    /// Lux on a surface that faces it, which is the root of `squared` away from it at `at`.
+    /// Lux on surfaces around `at` that face it, whose mean square distance from there is `spread`.
     pub fn illuminance(&self, at: Vec3, spread: f64) -> f64 {
         let most = f64::from(self.intensity.max_element());
         match self.kind {

@@ -81,6 +81,9 @@ fn a_file_s_lights_and_first_camera_are_taken_and_said() {
     );
     // Beside the middle of the mesh, which is a quarter in front of its plane.
     assert_eq!(camera.target, Vec3::new(0.0, 0.0, 0.25));
+    // Where it is inside of a solid, its file is to blame.
+    let inside = loaded.camera_inside(0).unwrap().to_string();
+    assert!(inside.contains("mesh[0].file"), "{inside}");
     let [lights, seen] = &loaded.notes[..] else {
         panic!("{:?}", loaded.notes);
     };

@@ -4,6 +4,7 @@
 //! follow them. Offsets and lengths are checked where bytes are taken, since those are not part of the document.
 
 mod check;
+mod view;
 
 use std::collections::BTreeMap;
 
@@ -12,6 +13,8 @@ use serde_json::Value;
 
 use super::super::draco::Compressed;
 use super::{LoadMeshErrorKind, malformed};
+pub(super) use view::{Camera, Light};
+use view::{DocumentExtensions, LightOfNode};
 
 /// A whole document. Materials stay JSON, since many extensions add to them.
 #[derive(Debug, Deserialize)]
@@ -60,80 +63,6 @@ struct Asset {
 }
 
 #[derive(Debug, Deserialize)]
-struct DocumentExtensions {
-    #[serde(rename = "KHR_lights_punctual")]
-    lights: Option<Lights>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Lights {
-    #[serde(default)]
-    lights: Vec<Light>,
-}
-
-/// A light of KHR_lights_punctual.
-#[derive(Debug, Deserialize)]
-pub(super) struct Light {
-    pub name: Option<Box<str>>,
-    #[serde(rename = "type")]
-    pub kind: Box<str>,
-    #[serde(default = "white")]
-    pub color: [f32; 3],
-    #[serde(default = "one")]
-    pub intensity: f32,
-    pub range: Option<f32>,
-    pub spot: Option<Spot>,
-}
-
-fn white() -> [f32; 3] {
-    [1.0; 3]
-}
-
-fn one() -> f32 {
-    1.0
-}
-
-/// Half angles of a cone, radians.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "camelCase", default)]
-pub(super) struct Spot {
-    pub inner_cone_angle: f32,
-    pub outer_cone_angle: f32,
-}
-
-impl Default for Spot {
-    fn default() -> Self {
-        Self {
-            inner_cone_angle: 0.0,
-            outer_cone_angle: std::f32::consts::FRAC_PI_4,
-        }
-    }
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Camera {
-    pub name: Option<Box<str>>,
-    #[serde(rename = "type")]
-    pub kind: Box<str>,
-    pub perspective: Option<Perspective>,
-    pub orthographic: Option<Orthographic>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Perspective {
-    pub yfov: f32,
-    pub aspect_ratio: Option<f32>,
-}
-
-/// Half of what is seen across and up.
-#[derive(Debug, Deserialize)]
-pub(super) struct Orthographic {
-    pub xmag: f32,
-    pub ymag: f32,
-}
-
-#[derive(Debug, Deserialize)]
 pub(super) struct Scene {
     #[serde(default)]
     nodes: Vec<usize>,
@@ -163,11 +92,6 @@ struct NodeExtensions {
     visibility: Option<Visibility>,
     #[serde(rename = "KHR_lights_punctual")]
     light: Option<LightOfNode>,
-}
-
-#[derive(Debug, Deserialize)]
-struct LightOfNode {
-    light: usize,
 }
 
 /// EXT_mesh_gpu_instancing: accessors by attribute.
