@@ -257,7 +257,7 @@ fn picture(surface: &Arc<DisplacedSurface>, lod: Lod, spp: u32) -> Picture {
         ..Film::default()
     };
     let placed = world(&prisms(surface, lod), Placement::World);
-    placed.set_spread(camera.pixel_spread(film.height));
+    placed.set_spread(camera.pixel_spread(film.width, film.height));
     let tracer = tracers(&placed).remove(0);
     let sun = Light::Sun {
         direction: Vec3::new(-0.5, 0.3, 0.6).normalize(),

@@ -89,7 +89,7 @@ macro_rules! mesh {
                 concat!(
                     "[[mesh]]\nfile = \"",
                     $file,
-                    "\"\ntexcoords = \"box\"\n[mesh.displacement]\nmap = \"flat.png\"\nscale = -0.1\nwrap = \"mirror\"\n"
+                    "\"\ntexcoords = \"box\"\nup = \"z\"\nunit = 0.5\n[mesh.displacement]\nmap = \"flat.png\"\nscale = -0.1\nwrap = \"mirror\"\n"
                 ),
             ]),
             is_text: $is_text,
@@ -215,8 +215,10 @@ pub fn end_at_own_panics() {
     }));
 }
 
-/// What was loaded can be traced, and its hits are points.
+/// What was loaded can be traced, its hits are points, and its lights and camera are numbers.
 fn trace(loaded: &Loaded) {
+    let seen = format!("{:?} {:?}", loaded.scene.lights, loaded.scene.camera);
+    assert!(!seen.contains("NaN"), "{seen}");
     let Ok(world) = loaded.scene.world() else {
         return;
     };

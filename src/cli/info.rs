@@ -44,6 +44,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let loaded = Loaded::from_file_with(&args.scene, &[], args.load.options())?;
     outputs.spare(&loaded.files)?;
     super::warn(&loaded.warnings);
+    super::note(&loaded.notes);
     let world = loaded.scene.world()?;
     let engine = args.engine.build(&world)?;
     let info = Info {

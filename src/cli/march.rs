@@ -55,7 +55,9 @@ impl From<LodKind> for Lod {
 impl MarchArgs {
     /// The angle of a pixel if one is given here, else the scene's camera's.
     pub fn spread(&self, scene: &Scene) -> f32 {
-        let camera = scene.camera.pixel_spread(scene.film.height);
+        let camera = scene
+            .camera
+            .pixel_spread(scene.film.width, scene.film.height);
         self.spread.unwrap_or(camera)
     }
 

@@ -103,7 +103,14 @@ fn explain(usage: &clap::Error) -> ExitCode {
     }
 }
 
-/// Says what was mended in the input.
+/// Says what was taken of the input without being asked for.
+fn note(notes: &[String]) {
+    for note in notes {
+        eprintln!("prismarch: {note}");
+    }
+}
+
+/// Says what was mended in the input, and what of it has no effect.
 fn warn(warnings: &[String]) {
     for warning in warnings {
         eprintln!("prismarch: warning: {warning}");

@@ -156,6 +156,9 @@ impl Job<'_> {
         let mut loaded = Loaded::from_file_with(self.scene, self.set, self.load)?;
         self.spare(&loaded.files)?;
         super::warn(&loaded.warnings);
+        if !self.quiet {
+            super::note(&loaded.notes);
+        }
         self.film.apply(&mut loaded.scene.film)?;
         loaded.scene.film.progressive |= self.watch.preview.is_some();
         if let Some(integrator) = self.integrator.and_then(Integrator::named) {

@@ -27,7 +27,7 @@ pub struct Eye {
 
 impl Eye {
     /// The camera over a film of `width` x `height` square pixels; field of view and orthographic height span its
-    /// height.
+    /// height, or more where it is narrower than the camera's aspect.
     ///
     /// An `up` parallel to the view leaves the roll open; some roll is chosen.
     pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
@@ -44,10 +44,7 @@ impl Eye {
             size: Vec2::new(width as f32, height as f32),
             shift: camera.shift,
             projection: camera.projection,
-            half_height: match camera.projection {
-                Projection::Orthographic { height } => 0.5 * height,
-                _ => (0.5 * camera.fov).tan(),
-            },
+            half_height: camera.half_height(width, height),
             lens: camera.lens,
         }
     }

@@ -1,7 +1,9 @@
 //! From a scene file to a [`Scene`]: loads what it names, each file once, and fills in what it leaves out.
 
 mod assets;
+mod cameras;
 mod frame;
+mod lights;
 mod materials;
 
 use std::f32::consts::PI;
@@ -9,11 +11,14 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::{Affine3A, Vec3};
+use glam::Affine3A;
 
 use super::error::{AssetError, SceneError};
-use super::file::{DisplacementTable, Keyed, LightTable, MeshTable, SCALE, SceneFile, default_sun};
-use super::load::{FileDisplacement, FileMaterial, LoadOptions, Part, conjugated, load_mesh_with};
+use super::file::{DisplacementTable, Keyed, LightTable, MeshTable, SCALE, SceneFile};
+use super::load::{
+    FileDisplacement, FileMaterial, LoadMeshError, LoadOptions, Part, Unused, conjugated,
+    load_mesh_with,
+};
 use super::{Camera, Film, Integrator, Light, Material, ObjectShape, Scene, SceneObject};
 use crate::image::Channel;
 use crate::prism::{March, PrismOptions};
@@ -41,10 +46,12 @@ pub struct Loaded {
     pub maps: Vec<MapFile>,
     /// What was mended on the way, one line each.
     pub warnings: Vec<String>,
+    /// What was taken of mesh files without being asked for, one line each.
+    pub notes: Vec<String>,
     /// Every file that was read: scene, meshes and what they name, pictures.
     pub files: Vec<PathBuf>,
-    /// Where the file places the camera, if it does.
-    eye: Option<Keyed<Vec3>>,
+    /// Where the file says what places the camera, if it does.
+    eye: Option<Keyed<()>>,
 }
 
 /// One mesh under one map, as named on a command line.
@@ -93,26 +100,26 @@ impl Loaded {
         for mesh in &file.meshes {
             builder.mesh(mesh, options)?;
         }
-        let lights = match &file.lights[..] {
-            [] if builder.materials.iter().any(Material::is_emissive) => Vec::new(),
+        let shines =
+            !builder.file_lights.is_empty() || builder.materials.iter().any(Material::is_emissive);
+        let mut lights = match &file.lights[..] {
+            [] if shines => Vec::new(),
             [] => builder.lights(&LightTable::daylight())?,
             lights => builder.lights(lights)?,
         };
-        let camera = frame::camera(&file.camera, frame::bounds(&builder.objects))?;
+        lights.append(&mut builder.file_lights);
+        let (camera, eye) = builder.camera(&file.camera)?;
         builder.files.push(path.to_owned());
         let loaded = builder.finish(path, camera, file.film, lights, file.integrator);
-        Ok(Self {
-            eye: file.camera.position,
-            ..loaded
-        })
+        Ok(Self { eye, ..loaded })
     }
 
     /// The error that the camera is inside of this object; `None` where the file does not place the camera, since
     /// what is framed is seen from outside.
     pub fn camera_inside(&self, object: usize) -> Option<SceneError> {
         let name = &self.scene.objects[object].name;
-        let found = format!("a point inside of {name:?}");
-        let expected = "a point outside of closed surfaces, or allow_inside = true for a room";
+        let found = format!("a camera inside of {name:?}");
+        let expected = "one outside of closed surfaces, or allow_inside = true for a room";
         self.eye.as_ref().map(|eye| eye.refuse(found, expected))
     }
 
@@ -127,6 +134,7 @@ impl Loaded {
         let mut file = load_mesh_with(mesh, source.options)?;
         builder.files.append(&mut file.files);
         builder.warn_all(mesh, std::mem::take(&mut file.warnings));
+        builder.unused_of(mesh).kinds = std::mem::take(&mut file.unused);
         if let Some(projection) = source.texcoords {
             file.project(projection);
         }
@@ -187,6 +195,14 @@ impl Default for Shaping {
     }
 }
 
+/// What of a mesh file has no effect.
+#[derive(Default)]
+struct UnusedOfFile {
+    kinds: Unused,
+    /// How many cameras are not taken.
+    cameras: usize,
+}
+
 /// Collects a scene.
 #[derive(Default)]
 struct Builder {
@@ -194,7 +210,14 @@ struct Builder {
     objects: Vec<SceneObject>,
     materials: Vec<Material>,
     default_material: Option<usize>,
+    /// Lights of mesh files.
+    file_lights: Vec<Light>,
+    /// Cameras of mesh files.
+    cameras: Vec<cameras::Offered>,
+    /// What has no effect, by mesh file.
+    unused: Vec<(PathBuf, UnusedOfFile)>,
     warnings: Vec<String>,
+    notes: Vec<String>,
     /// All that was read but pictures, which `assets` knows.
     files: Vec<PathBuf>,
 }
@@ -212,11 +235,18 @@ impl Builder {
             join: table.join,
         };
         let mut loaded = load_mesh_with(path, options).map_err(|e| asset(e.into()))?;
+        let refused = |kind| {
+            let path = path.clone();
+            asset(LoadMeshError { path, kind }.into())
+        };
+        loaded.place(&table.stand).map_err(refused)?;
         if let Some(projection) = table.texcoords {
             loaded.project(projection);
         }
+        self.lights_and_cameras(table, &loaded)?;
         self.files.append(&mut loaded.files);
         self.warn_all(path, loaded.warnings);
+        self.unused_of(path).kinds = loaded.unused;
         let single = loaded.parts.len() == 1;
         // By what they are: several may have one name, or none.
         let mut of_file: Vec<(FileMaterial, usize)> = Vec::new();
@@ -385,46 +415,6 @@ impl Builder {
         })
     }
 
-    fn lights(&mut self, tables: &[LightTable]) -> Result<Vec<Light>, SceneError> {
-        let sun = tables.iter().find_map(|light| match light {
-            LightTable::Sun { direction, .. } => Some(*direction),
-            _ => None,
-        });
-        let light = |table: &LightTable| {
-            Ok(match *table {
-                LightTable::Sun {
-                    direction,
-                    strength,
-                } => Light::Sun {
-                    direction,
-                    strength,
-                },
-                LightTable::Sky {
-                    turbidity,
-                    strength,
-                } => Light::Sky {
-                    sun_direction: sun.unwrap_or_else(default_sun),
-                    turbidity,
-                    strength,
-                },
-                LightTable::Environment {
-                    ref file,
-                    rotation,
-                    strength,
-                } => Light::Environment {
-                    image: self
-                        .assets
-                        .environment(&file.value)
-                        .map_err(|e| file.asset(e))?,
-                    rotation,
-                    strength,
-                },
-                LightTable::Ready(ref light) => light.clone(),
-            })
-        };
-        tables.iter().map(light).collect()
-    }
-
     /// Warns, unless the same has been said: one file may make several meshes.
     fn warn(&mut self, path: &Path, what: impl Display) {
         let line = format!("{}: {what}", path.display());
@@ -439,6 +429,16 @@ impl Builder {
         }
     }
 
+    /// What of the mesh file at `path` has no effect.
+    fn unused_of(&mut self, path: &Path) -> &mut UnusedOfFile {
+        let known = self.unused.iter().position(|(known, _)| known == path);
+        let index = known.unwrap_or_else(|| {
+            self.unused.push((path.to_owned(), UnusedOfFile::default()));
+            self.unused.len() - 1
+        });
+        &mut self.unused[index].1
+    }
+
     fn finish(
         mut self,
         path: &Path,
@@ -448,10 +448,17 @@ impl Builder {
         integrator: Integrator,
     ) -> Loaded {
         self.files.extend(self.assets.files().map(Path::to_owned));
+        for (path, UnusedOfFile { mut kinds, cameras }) in std::mem::take(&mut self.unused) {
+            kinds.add(cameras, "camera");
+            if !kinds.is_empty() {
+                self.warn(&path, kinds);
+            }
+        }
         Loaded {
             files: self.files,
             maps: self.assets.into_maps(),
             warnings: self.warnings,
+            notes: self.notes,
             eye: None,
             scene: Scene {
                 path: path.to_owned(),

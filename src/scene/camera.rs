@@ -4,6 +4,9 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
+/// The least field of view and the largest, degrees.
+pub(super) const FIELD_OF_VIEW: std::ops::RangeInclusive<f32> = 0.01..=179.9;
+
 /// A camera without a shutter: everything stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -15,6 +18,8 @@ pub struct Camera {
     pub up: Vec3,
     /// Vertical field of view of a perspective, radians, in (0, pi).
     pub fov: f32,
+    /// Width over height of what must be in the picture, above 0: a narrower film shows more above and below. Not of panoramas.
+    pub aspect: Option<f32>,
     /// How directions lie on the film.
     pub projection: Projection,
     /// By which part of the picture's height the film is moved to the right and up; not of panoramas.
@@ -33,6 +38,7 @@ impl Default for Camera {
             target: Vec3::NEG_Z,
             up: Vec3::Y,
             fov: 40f32.to_radians(),
+            aspect: None,
             projection: Projection::Perspective,
             shift: Vec2::ZERO,
             lens: None,
@@ -42,11 +48,21 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// The angle of one of `height` rows of pixels, radians, in the middle of the picture: the spread of the cone around a camera
+    /// Half the height of what a film of `width` x `height` square pixels shows: at distance 1, or of an orthographic picture. Not of panoramas.
+    pub fn half_height(&self, width: u32, height: u32) -> f32 {
+        let half = match self.projection {
+            Projection::Orthographic { height } => 0.5 * height,
+            _ => (0.5 * self.fov).tan(),
+        };
+        let film = width as f32 / height as f32;
+        half * self.aspect.map_or(1.0, |aspect| (aspect / film).max(1.0))
+    }
+
+    /// The angle of a row of pixels of a film of `width` x `height`, radians, in the middle of the picture: the spread of the cone around a camera
     /// ray. 0 where all rays are parallel.
-    pub fn pixel_spread(&self, height: u32) -> f32 {
+    pub fn pixel_spread(&self, width: u32, height: u32) -> f32 {
         let picture = match self.projection {
-            Projection::Perspective => 2.0 * (0.5 * self.fov).tan(),
+            Projection::Perspective => 2.0 * self.half_height(width, height),
             Projection::Orthographic { .. } => 0.0,
             Projection::Panorama => PI,
         };

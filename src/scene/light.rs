@@ -69,6 +69,8 @@ pub enum Light {
         position: Vec3,
         /// Radiant intensity, linear RGB.
         intensity: Vec3,
+        /// Where it has faded out, above 0; infinite for light as it is.
+        range: f32,
     },
     /// A point that shines into a cone.
     Spot {
@@ -82,6 +84,8 @@ pub enum Light {
         cos_inner: f32,
         /// Radiant intensity on the axis, linear RGB.
         intensity: Vec3,
+        /// Where it has faded out, above 0; infinite for light as it is.
+        range: f32,
     },
     /// Parallel light from infinitely far away.
     Directional {
@@ -93,6 +97,14 @@ pub enum Light {
 }
 
 impl Light {
+    /// The cosines of a spot's cone, outer and inner, for half angles in radians, `inner` at most `outer`. A hard edge still has the width that
+    /// keeps the fall-off a number.
+    pub fn cone(outer: f32, inner: f32) -> [f32; 2] {
+        let cos_outer = outer.cos();
+        let cos_inner = inner.min(outer * (1.0 - 1e-3)).cos();
+        [cos_outer, cos_inner.max(cos_outer.next_up())]
+    }
+
     /// Whether it comes from outside of the scene, so that what is closed keeps it out.
     pub fn is_distant(&self) -> bool {
         matches!(

@@ -29,7 +29,7 @@ impl Scene {
                 object: self.objects[source.object()].name.clone(),
                 source,
             })?;
-        world.set_spread(self.camera.pixel_spread(self.film.height));
+        world.set_spread(self.camera.pixel_spread(self.film.width, self.film.height));
         Ok(world)
     }
 

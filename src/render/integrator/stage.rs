@@ -61,7 +61,11 @@ impl<'a> Stage<'a> {
             object_materials: input.object_materials,
             offset: RayOffset::for_scene(input.tracer.bounds().diagonal()),
             has_holes: input.materials.iter().any(Material::has_holes),
-            cone: Cone::from_eye(input.camera.pixel_spread(input.film.height)),
+            cone: Cone::from_eye(
+                input
+                    .camera
+                    .pixel_spread(input.film.width, input.film.height),
+            ),
         }
     }
 

@@ -298,9 +298,11 @@ fn one(light: &Light, air: f32) -> Prepared {
         Light::Point {
             position,
             intensity,
+            range,
         } => Prepared::local(PointLight {
             position,
             intensity,
+            range,
             cone: None,
         }),
         Light::Spot {
@@ -309,9 +311,11 @@ fn one(light: &Light, air: f32) -> Prepared {
             cos_outer,
             cos_inner,
             intensity,
+            range,
         } => Prepared::local(PointLight {
             position,
             intensity,
+            range,
             cone: Some(Cone {
                 axis: direction,
                 cos_outer,

@@ -14,6 +14,8 @@ pub struct PointLight {
     pub position: Vec3,
     /// Radiant intensity, at most.
     pub intensity: Vec3,
+    /// Where it has faded out; may be infinite.
+    pub range: f32,
     /// None shines all around.
     pub cone: Option<Cone>,
 }
@@ -37,6 +39,13 @@ impl Cone {
     }
 }
 
+impl PointLight {
+    /// What `range` leaves at a distance: KHR_lights_punctual, Range Property.
+    fn window(&self, distance: f32) -> f32 {
+        (1.0 - (distance / self.range).powi(4)).max(0.0)
+    }
+}
+
 impl LocalLight for PointLight {
     fn sample(&self, position: Vec3, _u: Vec2) -> LightSample {
         let to = self.position - position;
@@ -45,7 +54,8 @@ impl LocalLight for PointLight {
             return LightSample::NONE;
         }
         let direction = to / distance;
-        let falloff = self.cone.map_or(1.0, |cone| cone.falloff(-direction));
+        let cone = self.cone.map_or(1.0, |cone| cone.falloff(-direction));
+        let falloff = cone * self.window(distance);
         LightSample {
             direction,
             distance,

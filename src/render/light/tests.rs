@@ -106,9 +106,15 @@ fn shapes_light_by_their_analytic_irradiance() {
     let spot = PointLight {
         position: position + 2.0 * Vec3::Z,
         intensity: radiance,
+        range: f32::INFINITY,
         cone: Some(cone),
     };
     close(irradiance(&spot, position, Vec3::Z), 0.25, "spot");
+    let fading = |range: f32| PointLight { range, ..spot };
+    let faded = irradiance(&fading(4.0), position, Vec3::Z);
+    close(faded, 0.25 * 15.0 / 16.0, "half way to its range");
+    let beyond = irradiance(&fading(1.5), position, Vec3::Z);
+    assert_eq!(beyond, Vec3::ZERO, "beyond its range it is dark");
     let beside = irradiance(&spot, position + 5.0 * Vec3::X, Vec3::Z);
     assert_eq!(beside, Vec3::ZERO, "outside of the cone it is dark");
 }

@@ -4,7 +4,8 @@ use glam::{Vec3, Vec3A};
 
 use crate::ray::Aabb;
 use crate::scene::error::SceneError;
-use crate::scene::file::{CameraTable, ProjectionTable};
+use crate::scene::file::{CameraTable, LensTable, ProjectionTable};
+use crate::scene::load::{FileCamera, FileProjection};
 use crate::scene::{Camera, Lens, ObjectShape, Projection, SceneObject};
 
 /// From the middle of the scene to the eye: half from the right, a little from above.
@@ -76,6 +77,7 @@ pub(super) fn camera(table: &CameraTable, bounds: Aabb) -> Result<Camera, SceneE
             target,
             up,
             fov: table.fov,
+            aspect: None,
             projection: match table.projection {
                 // Where nothing is said, as high as a perspective shows at the target.
                 ProjectionTable::Orthographic { height } => Projection::Orthographic {
@@ -85,14 +87,51 @@ pub(super) fn camera(table: &CameraTable, bounds: Aabb) -> Result<Camera, SceneE
                 ProjectionTable::Panorama => Projection::Panorama,
             },
             shift: table.shift,
-            lens: table.lens.map(|lens| Lens {
-                radius: 0.5 * lens.aperture,
-                focus: lens.focus_distance.unwrap_or(view.length()),
-                blades: lens.blades,
-                rotation: lens.blade_rotation,
-            }),
+            lens: table.lens.map(|l| lens(l, view.length())),
             allow_inside: table.allow_inside,
         }),
+    }
+}
+
+/// The camera of a mesh file, with what the scene adds to it.
+pub(super) fn through(camera: &FileCamera, table: &CameraTable, bounds: Aabb) -> Camera {
+    let position = camera.position;
+    let to_middle = 0.5 * (bounds.min + bounds.max) - position;
+    // The target is beside the middle of the scene, if that is ahead; far enough for its digits to tell the direction.
+    let least = 1e-3 * position.abs().max_element();
+    let ahead = to_middle.dot(camera.forward);
+    let distance = if ahead > least {
+        ahead
+    } else {
+        to_middle.length().max(least)
+    };
+    let distance = if distance > 0.0 { distance } else { 1.0 };
+    let (projection, fov, aspect) = match camera.projection {
+        FileProjection::Perspective { fov, aspect } => (Projection::Perspective, fov, aspect),
+        FileProjection::Orthographic { width, height } => {
+            let projection = Projection::Orthographic { height };
+            (projection, table.fov, Some(width / height))
+        }
+    };
+    Camera {
+        position,
+        target: position + distance * camera.forward,
+        up: camera.up,
+        fov,
+        aspect,
+        projection,
+        shift: table.shift,
+        lens: table.lens.map(|l| lens(l, distance)),
+        allow_inside: table.allow_inside,
+    }
+}
+
+fn lens(table: LensTable, focus: f32) -> Lens {
+    Lens {
+        radius: 0.5 * table.aperture,
+        focus: table.focus_distance.unwrap_or(focus),
+        blades: table.blades,
+        rotation: table.blade_rotation,
     }
 }
 

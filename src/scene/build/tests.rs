@@ -1,6 +1,7 @@
 use std::fs;
 use std::sync::Arc;
 
+use glam::Vec3;
 use tempfile::TempDir;
 
 use super::*;
@@ -665,3 +666,5 @@ fn materials_without_a_name_stay_apart() {
     let metallic = |object: usize| &scene.materials[scene.objects[object].material].metallic;
     assert!(metallic(0).is(0.25) && !metallic(1).is(0.25));
 }
+
+mod lights;

@@ -4,10 +4,18 @@ use glam::{Vec2, Vec3};
 
 use super::{Item, Keyed, SceneError, Section, keyed};
 use crate::scene::Camera;
+use crate::scene::camera::FIELD_OF_VIEW;
 
-/// The camera as written; what is left out is framed around the scene.
+/// What places a camera: with any of these it is the scene's own.
+const OWN: [&str; 6] = ["type", "position", "target", "up", "fov", "height"];
+
+/// The camera as written; what is left out is framed around the scene, or a mesh file's.
 #[derive(Debug)]
 pub(in crate::scene) struct CameraTable {
+    /// Which camera of the mesh files.
+    pub from: Option<Keyed<CameraChoice>>,
+    /// Whether the scene places it, by any key that does so.
+    pub own: bool,
     pub position: Option<Keyed<Vec3>>,
     pub target: Option<Keyed<Vec3>>,
     pub up: Option<Keyed<Vec3>>,
@@ -17,6 +25,14 @@ pub(in crate::scene) struct CameraTable {
     pub shift: Vec2,
     pub lens: Option<LensTable>,
     pub allow_inside: bool,
+}
+
+/// Names a camera of the mesh files.
+#[derive(Clone, Debug)]
+pub(in crate::scene) enum CameraChoice {
+    Name(String),
+    /// From 0, across the files.
+    Number(usize),
 }
 
 /// A projection as written.
@@ -48,6 +64,8 @@ impl Default for CameraTable {
             ..
         } = Camera::default();
         Self {
+            from: None,
+            own: false,
             position: None,
             target: None,
             up: None,
@@ -63,6 +81,7 @@ impl Default for CameraTable {
 impl CameraTable {
     pub(super) fn read(item: Item) -> Result<Self, SceneError> {
         let mut section = item.section(&[
+            "from",
             "type",
             "position",
             "target",
@@ -76,6 +95,13 @@ impl CameraTable {
             "blade_rotation",
             "allow_inside",
         ])?;
+        let from = section.optional("from", choice)?;
+        let own = OWN.into_iter().find(|key| section.has(key));
+        if let (Some(from), Some(key)) = (&from, own) {
+            let found = format!("a camera of a mesh file, beside {key}");
+            let expected = format!("no camera.{key}; shift and the lens may be given");
+            return Err(from.refuse(found, expected));
+        }
         let position = section.optional("position", |i| Ok(keyed(&i, i.point()?)))?;
         let target = section.optional("target", |i| Ok(keyed(&i, i.point()?)))?;
         let up = section.optional("up", |i| {
@@ -86,11 +112,13 @@ impl CameraTable {
         })?;
         let fov = section.optional("fov", |i| {
             i.number("degrees above 0 and below 180", |x| {
-                (0.01..=179.9).contains(&x)
+                FIELD_OF_VIEW.contains(&x)
             })
         })?;
         let default = Self::default();
         Ok(Self {
+            from,
+            own: own.is_some(),
             position,
             target,
             up,
@@ -105,6 +133,16 @@ impl CameraTable {
                 .unwrap_or(default.allow_inside),
         })
     }
+}
+
+fn choice(item: Item) -> Result<Keyed<CameraChoice>, SceneError> {
+    let choice = if item.is_integer() {
+        CameraChoice::Number(item.integer(0..=u32::MAX)? as usize)
+    } else {
+        let expected = "the name of a camera of a mesh file, or its number from 0";
+        CameraChoice::Name(item.text(expected)?.to_owned())
+    };
+    Ok(keyed(&item, choice))
 }
 
 fn projection(section: &mut Section) -> Result<ProjectionTable, SceneError> {

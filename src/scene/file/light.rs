@@ -116,10 +116,12 @@ impl LightTable {
             }
             LightKind::Rectangle => rectangle(item),
             LightKind::Point => {
-                let mut section = item.section(&["type", "position", "color", "strength"])?;
+                let mut section =
+                    item.section(&["type", "position", "range", "color", "strength"])?;
                 Ok(Self::Ready(Light::Point {
                     position: point(&mut section, "position")?,
                     intensity: color(&mut section)?,
+                    range: range(&mut section)?,
                 }))
             }
             LightKind::Spot => spot(item),
@@ -173,7 +175,7 @@ fn rectangle(item: Item) -> Result<LightTable, SceneError> {
 
 fn spot(item: Item) -> Result<LightTable, SceneError> {
     let mut section = item.section(&[
-        "type", "position", "target", "angle", "softness", "color", "strength",
+        "type", "position", "target", "angle", "softness", "range", "color", "strength",
     ])?;
     let position = point(&mut section, "position")?;
     let angle = section.optional("angle", |i| {
@@ -183,14 +185,15 @@ fn spot(item: Item) -> Result<LightTable, SceneError> {
     })?;
     let softness = section.optional("softness", super::fraction)?;
     let outer = 0.5 * angle.unwrap_or(45.0).to_radians();
-    // A hard edge still has the width that keeps the fall-off a number.
-    let inner = outer * (1.0 - softness.unwrap_or(0.2).max(1e-3));
+    let inner = outer * (1.0 - softness.unwrap_or(0.2));
+    let [cos_outer, cos_inner] = Light::cone(outer, inner);
     Ok(LightTable::Ready(Light::Spot {
         position,
         direction: towards(&mut section, position)?,
-        cos_outer: outer.cos(),
-        cos_inner: inner.cos(),
+        cos_outer,
+        cos_inner,
         intensity: color(&mut section)?,
+        range: range(&mut section)?,
     }))
 }
 
@@ -212,6 +215,12 @@ fn radius(section: &mut Section) -> Result<f32, SceneError> {
     section
         .require("radius", "world units above 0")?
         .length(false)
+}
+
+/// Where the light has faded out; without one it goes on.
+fn range(section: &mut Section) -> Result<f32, SceneError> {
+    let range = section.optional("range", |i| i.length(false))?;
+    Ok(range.unwrap_or(f32::INFINITY))
 }
 
 /// `color` times `strength`.

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::{Affine3A, EulerRot, Quat, Vec3};
+use glam::{Affine3A, EulerRot, Mat3, Quat, Vec3};
 
-use super::{Item, Keyed, STEP_TEXELS, SceneError, channel, file_path, keyed, uv_transform, wrap};
+use super::{
+    Item, Keyed, STEP_TEXELS, SceneError, channel, factor, file_path, keyed, uv_transform, wrap,
+};
 use crate::image::Channel;
 use crate::prism::{EditBounds, Lod, March, PrismOptions, Step};
 use crate::surface::{Projection, Seams, ShadingNormals, UvTransform, Wrap};
@@ -22,12 +24,30 @@ const TEXCOORDS: [(&str, Option<Projection>); 5] = [
     ("planar", Some(Projection::Planar)),
 ];
 
+/// Factors that a length may be multiplied by: beyond these, squares and products of f32 lengths vanish or overflow.
+const LENGTHS: std::ops::RangeInclusive<f32> = 1e-9..=1e9;
+
+/// The words for what one unit of a file is, where world units are metres.
+const UNITS: [(&str, f32); 5] = [
+    ("mm", 0.001),
+    ("cm", 0.01),
+    ("m", 1.0),
+    ("in", 0.0254),
+    ("ft", 0.3048),
+];
+
 /// One mesh as written.
 #[derive(Debug)]
 pub(in crate::scene) struct MeshTable {
     /// Default: the file's stem.
     pub name: Option<String>,
     pub file: Keyed<PathBuf>,
+    /// From the file's space, which has its own up and unit, to one with +Y up and world units.
+    pub stand: Affine3A,
+    /// Whether the file's lights shine.
+    pub lights: bool,
+    /// What the file's candela and lux are multiplied by; default: by what they come to.
+    pub light_scale: Option<f32>,
     /// Compute normals even where the file has some.
     pub recompute_normals: bool,
     /// Radians, for computed normals.
@@ -68,6 +88,10 @@ impl MeshTable {
         let mut section = item.section(&[
             "name",
             "file",
+            "up",
+            "unit",
+            "lights",
+            "light_scale",
             "normals",
             "crease_angle",
             "join",
@@ -83,6 +107,11 @@ impl MeshTable {
         Ok(Self {
             name: section.optional("name", |i| Ok(i.text("a name, in quotes")?.to_owned()))?,
             file: file_path(&file, folder)?,
+            stand: stand(&mut section)?,
+            lights: section
+                .optional("lights", |i| i.word(&[("file", true), ("ignore", false)]))?
+                .unwrap_or(true),
+            light_scale: section.optional("light_scale", factor)?,
             recompute_normals: section
                 .optional("normals", |i| i.word(&modes))?
                 .unwrap_or(false),
@@ -250,6 +279,22 @@ fn instances(item: Item) -> Result<Vec<Affine3A>, SceneError> {
     items.into_iter().map(transform).collect()
 }
 
+/// `up` and `unit`. The numbers of the turn are whole, so that it rounds nothing.
+fn stand(section: &mut super::Section) -> Result<Affine3A, SceneError> {
+    let upright = Mat3::IDENTITY;
+    let lying = Mat3::from_cols(Vec3::X, Vec3::NEG_Z, Vec3::Y);
+    let turn = section.optional("up", |i| i.word(&[("y", upright), ("z", lying)]))?;
+    let unit = section.optional("unit", |i| {
+        if i.is_text() {
+            return i.word(&UNITS);
+        }
+        let expected = "world units in one unit of the file, 1e-9 to 1e9; or where those are metres one of mm, cm, m, in, ft";
+        i.number(expected, |x| LENGTHS.contains(&x))
+    })?;
+    let turn = turn.unwrap_or(upright);
+    Ok(Affine3A::from_mat3(turn * unit.unwrap_or(1.0)))
+}
+
 /// Scaled, then turned about x, y and z in this order, then moved.
 fn transform(item: Item) -> Result<Affine3A, SceneError> {
     let mut section = item.section(&["translate", "rotate", "scale"])?;
@@ -269,15 +314,13 @@ fn transform(item: Item) -> Result<Affine3A, SceneError> {
 
 /// One factor, or one per axis; none is zero, or nothing would be left to hit.
 fn scale(item: Item) -> Result<Vec3, SceneError> {
-    /// Beyond these, squares and products of f32 lengths vanish or overflow.
-    const FACTOR: std::ops::RangeInclusive<f32> = 1e-9..=1e9;
     let expected = "a factor or [x, y, z], none of them 0 (1e-9 to 1e9 in size)";
     if item.is_array() {
         item.vec3(expected, |v| {
-            v.abs().to_array().iter().all(|x| FACTOR.contains(x))
+            v.abs().to_array().iter().all(|x| LENGTHS.contains(x))
         })
     } else {
-        let factor = item.number(expected, |x| FACTOR.contains(&x.abs()))?;
+        let factor = item.number(expected, |x| LENGTHS.contains(&x.abs()))?;
         Ok(Vec3::splat(factor))
     }
 }

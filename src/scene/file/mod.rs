@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use super::error::{AssetError, Place, SceneError};
 use super::{Film, Integrator};
 use crate::files::input;
-pub(super) use camera::{CameraTable, ProjectionTable};
+pub(super) use camera::{CameraChoice, CameraTable, LensTable, ProjectionTable};
 pub(crate) use film::{MAX_SIDE, MAX_SPP, MAX_STOPS, fits, too_many_pixels};
 pub(super) use light::{LightTable, default_sun};
 pub(super) use material::{
@@ -57,6 +57,15 @@ impl<T> Keyed<T> {
             key: self.key.clone(),
             found: found.into(),
             expected: expected.into(),
+        }
+    }
+
+    /// Another value at the same place.
+    pub fn with<U>(&self, value: U) -> Keyed<U> {
+        Keyed {
+            value,
+            key: self.key.clone(),
+            place: self.place.clone(),
         }
     }
 

@@ -106,6 +106,11 @@ impl<'a> Section<'a> {
         })
     }
 
+    /// Whether the table still has `key`.
+    pub fn has(&self, key: &str) -> bool {
+        self.entries.get(key).is_some()
+    }
+
     /// `read` applied to the value of `key`, if the table has it.
     pub fn optional<T>(
         &mut self,
@@ -281,6 +286,16 @@ impl<'a> Item<'a> {
     /// True for a table: `base_color` is either a table or numbers.
     pub fn is_table(&self) -> bool {
         matches!(self.value, DeValue::Table(_))
+    }
+
+    /// True for a whole number: `from` is either one or a name.
+    pub fn is_integer(&self) -> bool {
+        matches!(self.value, DeValue::Integer(_))
+    }
+
+    /// True for a string: `unit` is either a word or a number.
+    pub fn is_text(&self) -> bool {
+        matches!(self.value, DeValue::String(_))
     }
 
     /// True for an array: `scale` is either one number or three.

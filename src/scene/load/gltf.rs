@@ -1,20 +1,23 @@
 //! glTF 2.0 and GLB.
 //!
-//! All visible triangles of the default scene, in the pose that the file shows, node transforms baked in, compressed data unpacked.
+//! All visible triangles, lights and cameras of the default scene, in the pose that the file shows, node transforms baked in, compressed data unpacked.
 //! Nothing that a file says is trusted: its indices are checked when the document is parsed (`document`), its bytes when they are
 //! asked for (`buffers`, `accessor`), so that no reader behind those can be led astray.
 
 mod accessor;
 mod buffers;
+mod cameras;
 mod container;
 mod document;
 mod extensions;
 mod instances;
+mod lights;
 mod material;
 mod meshopt;
 mod nodes;
 mod primitive;
 mod skin;
+mod unused;
 mod uri;
 
 use std::collections::HashMap;
@@ -42,14 +45,14 @@ pub(super) fn read(
 ) -> Result<LoadedFile, LoadMeshErrorKind> {
     let container = container::open(bytes)?;
     let document = Document::parse(container.json)?;
-    let mut warnings = extensions::check(&document)?;
+    extensions::check(&document)?;
     let uris = Uris {
         path,
         allow_external: options.allow_external,
     };
     let buffers = Buffers::read(&document, &container, uris)?;
     let accessors = Accessors::new(&document, &buffers);
-    let materials = material::Reader::new(&document, &buffers, uris, &mut warnings)?;
+    let materials = material::Reader::new(&document, &buffers, uris)?;
     let worlds = nodes::world_transforms(&document)?;
     let roots = document
         .roots()
@@ -65,14 +68,21 @@ pub(super) fn read(
     };
     let visible = nodes::visible(&document, roots)?;
     check_repetition(&document, &visible, buffers.len())?;
-    for index in visible {
+    for &index in &visible {
         meshes.add(index)?;
     }
-    warnings.extend(meshes.texcoords.warnings);
+    let lights = lights::read(&document, &visible, &worlds)?;
+    let cameras = cameras::read(&document, &visible, &worlds)?;
+    let texcoords = meshes.texcoords;
+    let set = |material| texcoords.known(material);
+    let unused = unused::of(&document, &visible, set, materials.missing());
     let parts = meshes.parts.finish(|index| materials.material(index));
     Ok(LoadedFile {
         parts,
-        warnings,
+        lights,
+        cameras,
+        warnings: texcoords.warnings,
+        unused,
         files: buffers.files,
     })
 }
@@ -230,6 +240,12 @@ struct TexcoordChoice {
 }
 
 impl TexcoordChoice {
+    /// The set that was chosen for the material.
+    fn known(&self, material: Option<usize>) -> u32 {
+        let chosen = material.and_then(|index| self.by_material.get(&index));
+        chosen.copied().unwrap_or(0)
+    }
+
     /// The set that the material's textures are read by. If they are read by several, the first, with a warning.
     fn of(&mut self, reader: &material::Reader, material: Option<usize>) -> u32 {
         // The default material has no textures.

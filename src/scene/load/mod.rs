@@ -5,15 +5,19 @@
 //! one part whose triangle k is the file's face k. Larger polygons are cut into triangles (polygon.rs).
 //! Texture coordinates come out with v up, whatever the format's habit.
 
+mod camera;
 mod draco;
 mod gltf;
+mod light;
 mod locate;
 mod material;
 mod mtl;
 mod obj;
+mod placing;
 mod ply;
 mod polygon;
 mod text;
+mod unused;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -24,9 +28,14 @@ use thiserror::Error;
 use crate::files::input;
 use crate::ray::Aabb;
 use crate::surface::{MeshBuilder, Projection};
+pub use camera::{FileCamera, FileProjection};
+pub use light::{FileLight, FileLightKind};
 pub use material::{
     FileColor, FileDetail, FileDisplacement, FileMaterial, FileScalar, FileTexture, FileTextureUse,
 };
+pub use placing::Broken;
+pub use unused::Unused;
+pub(super) use unused::counted;
 
 /// Endings of the files that [`load_mesh`] reads.
 pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
@@ -132,8 +141,14 @@ pub struct LoadOptions {
 pub struct LoadedFile {
     /// At least one, each with at least one triangle.
     pub parts: Vec<Part>,
-    /// What was ignored and why, one line each, for the user.
+    /// In the file's order.
+    pub lights: Vec<FileLight>,
+    /// In the file's order.
+    pub cameras: Vec<FileCamera>,
+    /// What was mended and how, one line each, for the user.
     pub warnings: Vec<String>,
+    /// What has no effect.
+    pub unused: Unused,
     /// Every file that was read: the mesh file and what it names, pictures excepted.
     pub files: Vec<PathBuf>,
 }
@@ -174,15 +189,53 @@ pub fn load_mesh_with(path: &Path, options: LoadOptions) -> Result<LoadedFile, L
 }
 
 impl LoadedFile {
-    /// Replaces all texture coordinates by those of a projection around the whole file.
-    pub fn project(&mut self, projection: Projection) {
+    /// Moves everything by `transform`, whose scale is the same along all axes and not 0: parts, what places them, lights, cameras, and
+    /// lengths of materials.
+    ///
+    /// # Errors
+    ///
+    /// A light or a camera that comes to lie beyond what is traced; the message names it.
+    pub fn place(&mut self, transform: &Affine3A) -> Result<(), LoadMeshErrorKind> {
+        if *transform == Affine3A::IDENTITY {
+            return Ok(());
+        }
+        let scale = placing::scale(transform) as f32;
+        for part in &mut self.parts {
+            part.mesh = std::mem::take(&mut part.mesh).transformed(transform);
+            let instances = std::mem::take(&mut part.instances);
+            part.instances = conjugated(instances, transform).unwrap_or_default();
+            if let Some(material) = &mut part.material {
+                let distance = material.attenuation_distance * scale;
+                material.attenuation_distance = distance.max(f32::MIN_POSITIVE);
+            }
+        }
+        for light in &mut self.lights {
+            *light = light
+                .placed(transform)
+                .map_err(|e| misplaced("light", &light.name, e))?;
+        }
+        for camera in &mut self.cameras {
+            *camera = camera
+                .placed(transform)
+                .map_err(|e| misplaced("camera", camera.name(), e))?;
+        }
+        Ok(())
+    }
+
+    /// The box around all parts as they are.
+    pub fn bounds(&self) -> Aabb {
         let corners = |mesh: &MeshBuilder| {
             let indices = mesh.triangles.as_flattened().iter();
             let positions = indices.filter_map(|&i| mesh.positions.get(i as usize));
             positions.fold(Aabb::EMPTY, |b, &p| b.including(p))
         };
         let parts = self.parts.iter().map(|part| corners(&part.mesh));
-        let bounds = parts.fold(Aabb::EMPTY, Aabb::union);
+        parts.fold(Aabb::EMPTY, Aabb::union)
+    }
+
+    /// Replaces all texture coordinates by those of a projection around the whole file.
+    pub fn project(&mut self, projection: Projection) {
+        let bounds = self.bounds();
         for part in &mut self.parts {
             part.mesh.project(projection, bounds);
         }
@@ -235,6 +288,14 @@ fn read(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshErrorKi
         part.name = stem.clone().into_owned();
     }
     Ok(file)
+}
+
+/// The error that a light or a camera stands where it cannot be used.
+pub(super) fn misplaced(what: &str, name: &str, broken: Broken) -> LoadMeshErrorKind {
+    LoadMeshErrorKind::Malformed {
+        what: format!("{what} {name:?}"),
+        problem: broken.0,
+    }
 }
 
 /// Transforms of a mesh in its own space as transforms of the mesh as `moved` has it, so that one that stands still is moved as the

@@ -2,12 +2,12 @@
 //!
 //! Read: colours and highlights (`Kd`, `Ks`, `Ns`, `Ke`, `Tf`, `Ni`, `d`, `Tr`, `illum`), their maps, the PBR statements
 //! of later exporters (`Pr`, `Pm`, `Pc`, `Pcr`), normal maps (`norm`, `map_norm`), bump maps (`map_bump`, `bump`), and for displacement `disp`,
-//! `map_disp` and the bump maps, in this order of preference. Everything else is passed over, so a fault in it does no harm.
+//! `map_disp` and the bump maps, in this order of preference. Everything else is passed over, so a fault in it does no harm, and told.
 
 mod library;
 mod map;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
@@ -61,7 +61,12 @@ struct Reader<'a> {
     library: &'a Path,
     locator: &'a mut Locator,
     warnings: &'a mut Vec<String>,
+    /// In how many materials a statement stands that is not read, by its keyword.
+    others: &'a mut BTreeMap<Vec<u8>, usize>,
 }
+
+/// Light from everywhere, of renderers that know no light from surface to surface: every exporter writes it.
+const AMBIENT: [&[u8]; 2] = [b"ka", b"map_ka"];
 
 /// The last statement of each kind.
 #[derive(Default)]
@@ -138,12 +143,16 @@ impl Reader<'_> {
 
     fn said<'t>(&mut self, statements: &'t [u8], first_line: usize) -> Said<'t> {
         let mut said = Said::default();
+        let mut others = BTreeSet::new();
         for (number, (_, line)) in text::lines(statements).enumerate() {
             let line = text::uncommented(line);
             let (keyword, rest) = text::split_word(line);
             let lower = keyword.to_ascii_lowercase();
             let known = STATEMENTS.iter().find(|(name, _)| name.as_bytes() == lower);
             let Some(&(name, kind)) = known else {
+                if !keyword.is_empty() && !AMBIENT.contains(&&lower[..]) {
+                    others.insert(keyword);
+                }
                 continue;
             };
             let usable = match kind {
@@ -169,6 +178,9 @@ impl Reader<'_> {
                     text::shown(line)
                 ));
             }
+        }
+        for keyword in others {
+            *self.others.entry(keyword.to_owned()).or_default() += 1;
         }
         said
     }

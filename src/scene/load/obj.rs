@@ -3,7 +3,7 @@
 //! A positive index may name what stands further down, so the file is gone through twice.
 
 use std::collections::hash_map::Entry;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::num::NonZeroU32;
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 
 use super::mtl::Libraries;
 use super::polygon::Triangulator;
-use super::{LoadMeshErrorKind, LoadedFile, Parts, text};
+use super::{LoadMeshErrorKind, LoadedFile, Parts, Unused, text};
 
 /// Reads the bytes of the file at `path`.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
@@ -27,12 +27,15 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
     }
     let more = faces.warnings();
     let parts = faces.parts;
-    let (materials, files, mut warnings) = libraries.finish();
+    let mut unused = data.unused();
+    let (materials, files, mut warnings) = libraries.finish(&mut unused);
     warnings.extend(more);
     Ok(LoadedFile {
         parts: parts.finish(|index| materials.get(index).cloned()),
         warnings,
+        unused,
         files,
+        ..LoadedFile::default()
     })
 }
 
@@ -46,8 +49,12 @@ struct Data {
     libraries: Vec<Vec<u8>>,
     /// Names after `usemtl`.
     materials: BTreeSet<String>,
-    /// Whether vertices have colours.
-    coloured: bool,
+    /// How many vertices have colours.
+    coloured: usize,
+    /// What smoothing groups are called.
+    smoothing: BTreeSet<Vec<u8>>,
+    /// Lines of statements that are not read, by keyword.
+    others: BTreeMap<Vec<u8>, usize>,
 }
 
 impl Data {
@@ -72,13 +79,34 @@ impl Data {
                 b"usemtl" => {
                     data.materials.insert(material_name(rest));
                 }
-                b"mtllib" if libraries.insert(rest.to_owned()) => {
-                    data.libraries.push(rest.to_owned());
+                b"mtllib" => {
+                    if libraries.insert(rest.to_owned()) {
+                        data.libraries.push(rest.to_owned());
+                    }
                 }
-                _ => {}
+                b"s" => {
+                    data.smoothing.insert(rest.to_owned());
+                }
+                b"f" | b"fo" | b"o" | b"g" | b"" => {}
+                other => *data.others.entry(other.to_owned()).or_default() += 1,
             }
         }
         Ok(data)
+    }
+
+    /// What has no effect. One smoothing group for all is what is done anyhow, and normals of the file leave nothing to smooth.
+    fn unused(&self) -> Unused {
+        let mut unused = Unused::default();
+        if self.coloured > 0 {
+            unused.add_of("colours", self.coloured, "vertex");
+        }
+        if self.normals.is_empty() && self.smoothing.len() > 1 {
+            unused.add(self.smoothing.len(), "group of smoothing");
+        }
+        for (keyword, &lines) in &self.others {
+            unused.add_of(&text::shown(keyword), lines, "line");
+        }
+        unused
     }
 
     /// Three numbers, perhaps a weight, perhaps a colour.
@@ -91,7 +119,7 @@ impl Data {
                 let weight = text::parse(weight).filter(|&w: &f32| w != 0.0);
                 position /= weight.ok_or("a weight w other than 0")?;
             }
-            (_, colour) => self.coloured |= colour.is_some(),
+            (_, colour) => self.coloured += usize::from(colour.is_some()),
         }
         self.positions.push(position);
         Ok(())
@@ -262,9 +290,6 @@ impl<'a> Faces<'a> {
                 "texture coordinates are out of range or missing at a corner, and are left out",
             ),
             self.triangulator.warning(),
-            self.data
-                .coloured
-                .then(|| "the colours of vertices are left out".into()),
         ];
         lost.into_iter().flatten().collect()
     }

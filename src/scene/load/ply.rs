@@ -17,7 +17,7 @@ use super::locate::Locator;
 use super::polygon::Triangulator;
 use super::{
     FileColor, FileMaterial, FileTexture, FileTextureUse, LoadMeshErrorKind, LoadedFile, Parts,
-    text,
+    Unused, text,
 };
 use crate::surface::{UvTransform, Wrap};
 use header::{Element, Header, is_list};
@@ -62,7 +62,8 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
             }
         }
     }
-    let mut warnings = left_out(&header);
+    let mut unused = left_out(&header);
+    let mut warnings = Vec::new();
     let mut locator = Locator::default();
     let materials: Vec<_> = header
         .textures
@@ -77,25 +78,21 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
             "normals are not finite, and are computed instead: {lost} vertices"
         ));
     }
-    if faces.too_few > 0 {
-        let few = faces.too_few;
-        warnings.push(format!(
-            "faces of fewer than three corners are left out: {few}"
-        ));
-    }
+    unused.add(faces.too_few, "face of fewer than three corners");
     warnings.extend(builder.triangulator.warning());
     let parts = builder.finish();
     let textured = parts
         .parts
         .iter()
         .any(|part| !part.mesh.texcoords.is_empty());
-    if !materials.is_empty() && !textured {
-        warnings.push("the file's textures are left out: it has no texture coordinates".into());
+    if !textured {
+        unused.add(materials.len(), "texture (no texture coordinates)");
     }
     Ok(LoadedFile {
         parts: parts.finish(|index| materials.get(index).cloned()),
         warnings,
-        files: Vec::new(),
+        unused,
+        ..LoadedFile::default()
     })
 }
 
@@ -123,27 +120,20 @@ fn check_counts(header: &Header) -> Result<(), LoadMeshErrorKind> {
     Ok(())
 }
 
-/// What there is in the file and not in the result.
-fn left_out(header: &Header) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let others = |name: &str| {
-        header
-            .elements
-            .iter()
-            .any(|e| e.others.iter().any(|o| o == name))
-    };
-    if ["red", "r", "diffuse_red"].into_iter().any(others) {
-        warnings.push("colours of vertices or faces are left out".into());
+/// What the header announces that is not read: properties of elements that are, and other elements.
+fn left_out(header: &Header) -> Unused {
+    let mut unused = Unused::default();
+    for element in &header.elements {
+        let Element { name, others, .. } = element;
+        if ["vertex", "face", "tristrips"].contains(&&name[..]) {
+            for property in others {
+                unused.name(&format!("{name}.{property}"));
+            }
+        } else if element.definition.count > 0 {
+            unused.add(element.definition.count, &format!("element {name}"));
+        }
     }
-    let materials = header.elements.iter().any(|e| e.name == "material");
-    if materials
-        || ["material_index", "material_indices"]
-            .into_iter()
-            .any(others)
-    {
-        warnings.push("materials are left out: PLY has no common form for them".into());
-    }
-    warnings
+    unused
 }
 
 fn malformed(what: &str, error: &ParseError) -> LoadMeshErrorKind {

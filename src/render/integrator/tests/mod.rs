@@ -30,6 +30,7 @@ fn dark_room() -> Vec<Light> {
     vec![Light::Point {
         position: Vec3::Z * 50.0,
         intensity: Vec3::ZERO,
+        range: f32::INFINITY,
     }]
 }
 

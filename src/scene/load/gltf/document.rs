@@ -4,15 +4,17 @@
 //! follow them. Offsets and lengths are checked where bytes are taken, since those are not part of the document.
 
 mod check;
+mod view;
 
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use super::super::draco::Compressed;
 use super::{LoadMeshErrorKind, malformed};
+pub(super) use view::{Camera, Light};
+use view::{DocumentExtensions, LightOfNode};
 
 /// A whole document. Materials stay JSON, since many extensions add to them.
 #[derive(Debug, Deserialize)]
@@ -25,7 +27,7 @@ pub(super) struct Document {
     pub extensions_required: Vec<String>,
     scene: Option<usize>,
     #[serde(default)]
-    scenes: Vec<Scene>,
+    pub scenes: Vec<Scene>,
     #[serde(default)]
     pub nodes: Vec<Node>,
     #[serde(default)]
@@ -47,9 +49,10 @@ pub(super) struct Document {
     #[serde(default)]
     pub samplers: Vec<Sampler>,
     #[serde(default)]
-    animations: Vec<Animation>,
+    pub animations: Vec<Animation>,
     #[serde(default)]
-    cameras: Vec<IgnoredAny>,
+    pub cameras: Vec<Camera>,
+    extensions: Option<DocumentExtensions>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -60,7 +63,7 @@ struct Asset {
 }
 
 #[derive(Debug, Deserialize)]
-struct Scene {
+pub(super) struct Scene {
     #[serde(default)]
     nodes: Vec<usize>,
 }
@@ -72,7 +75,7 @@ pub(super) struct Node {
     pub children: Box<[u32]>,
     pub mesh: Option<u32>,
     pub skin: Option<u32>,
-    camera: Option<u32>,
+    pub camera: Option<u32>,
     pub weights: Option<Box<[f32]>>,
     pub matrix: Option<Box<[f32; 16]>>,
     pub translation: Option<Box<[f32; 3]>>,
@@ -87,6 +90,8 @@ struct NodeExtensions {
     instancing: Option<Instancing>,
     #[serde(rename = "KHR_node_visibility")]
     visibility: Option<Visibility>,
+    #[serde(rename = "KHR_lights_punctual")]
+    light: Option<LightOfNode>,
 }
 
 /// EXT_mesh_gpu_instancing: accessors by attribute.
@@ -297,11 +302,12 @@ pub(super) struct Image {
 pub(super) struct Sampler {
     pub wrap_s: Option<u32>,
     pub wrap_t: Option<u32>,
+    pub mag_filter: Option<u32>,
 }
 
 /// Not played, but its indices must lead somewhere as all others.
 #[derive(Debug, Deserialize)]
-struct Animation {
+pub(super) struct Animation {
     #[serde(default)]
     channels: Vec<Channel>,
     #[serde(default)]
@@ -360,6 +366,12 @@ impl Document {
         scenes.flat_map(|(index, scene)| scene.nodes.iter().map(move |&node| (index, node)))
     }
 
+    /// Those of KHR_lights_punctual.
+    pub fn lights(&self) -> &[Light] {
+        let extension = self.extensions.as_ref().and_then(|e| e.lights.as_ref());
+        extension.map_or(&[], |lights| &lights.lights)
+    }
+
     /// Whether the file says that it uses an extension.
     pub fn uses(&self, extension: &str) -> bool {
         self.extensions_used.iter().any(|name| name == extension)
@@ -369,6 +381,11 @@ impl Document {
 impl Node {
     pub fn instancing(&self) -> Option<&Instancing> {
         self.extensions.as_ref()?.instancing.as_ref()
+    }
+
+    /// The light that it places.
+    pub fn light(&self) -> Option<usize> {
+        Some(self.extensions.as_ref()?.light.as_ref()?.light)
     }
 
     /// KHR_node_visibility: an invisible node hides all below it, too.

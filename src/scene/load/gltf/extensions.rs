@@ -4,13 +4,14 @@ use super::LoadMeshErrorKind;
 use super::document::Document;
 
 /// Extensions that are read.
-const READ: [&str; 15] = [
+pub(super) const READ: [&str; 16] = [
     "KHR_draco_mesh_compression",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
     "EXT_meshopt_compression",
     "EXT_mesh_gpu_instancing",
     "KHR_node_visibility",
+    "KHR_lights_punctual",
     "KHR_texture_transform",
     "EXT_texture_webp",
     "KHR_materials_emissive_strength",
@@ -30,21 +31,19 @@ const SHAPES: [&str; 4] = [
     "_mesh_linking",
 ];
 
-/// One warning per required extension that is not read, but leaves the shape alone.
-///
 /// # Errors
 ///
-/// A required extension without which the shape is another one.
-pub(super) fn check(document: &Document) -> Result<Vec<String>, LoadMeshErrorKind> {
-    let required = document.extensions_required.iter();
-    let mut warnings = Vec::new();
-    for name in required.filter(|name| !READ.contains(&name.as_str())) {
-        if SHAPES.iter().any(|part| name.contains(part)) {
-            return Err(LoadMeshErrorKind::Unsupported {
-                what: format!("the glTF extension {name}, which the file requires,"),
-            });
-        }
-        warnings.push(format!("it requires the extension {name}, which is not read; the shape is taken to be the same without"));
+/// A required extension that is not read, and without which the shape is another one.
+pub(super) fn check(document: &Document) -> Result<(), LoadMeshErrorKind> {
+    let mut required = document.extensions_required.iter();
+    let shapes = |name: &&String| {
+        let shapes = SHAPES.iter().any(|part| name.contains(part));
+        shapes && !READ.contains(&name.as_str())
+    };
+    match required.find(shapes) {
+        None => Ok(()),
+        Some(name) => Err(LoadMeshErrorKind::Unsupported {
+            what: format!("the glTF extension {name}, which the file requires,"),
+        }),
     }
-    Ok(warnings)
 }

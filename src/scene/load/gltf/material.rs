@@ -4,7 +4,7 @@
 //! Read from the plain JSON, since extensions add to it. What is missing or of another type than it should be is as if it were not
 //! there; numbers out of range are clamped.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -34,7 +34,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// With all pictures looked up; those that are not there are warned of.
+    /// With all pictures looked up.
     ///
     /// # Errors
     ///
@@ -43,21 +43,14 @@ impl<'a> Reader<'a> {
         document: &'a Document,
         buffers: &Buffers,
         uris: Uris,
-        warnings: &mut Vec<String>,
     ) -> Result<Self, LoadMeshErrorKind> {
         let mut pictures = Pictures::new(document, buffers, uris);
         let images = (0..document.images.len()).map(|index| pictures.get(index));
         let images = images.collect::<Result<Vec<_>, _>>()?;
         let mut textures = Vec::with_capacity(document.textures.len());
-        for (index, texture) in document.textures.iter().enumerate() {
+        for texture in &document.textures {
             let source = texture.source.or_else(|| texture.source_of(WEBP));
             let picture = source.and_then(|source| images[source].clone());
-            if picture.is_none() {
-                warnings.push(format!(
-                    "texture {index} {}; materials have their factors alone",
-                    what_it_lacks(texture)
-                ));
-            }
             textures.push(picture.map(|source| FileTextureUse {
                 source,
                 wrap: wrap(document, texture),
@@ -134,15 +127,11 @@ fn called(index: usize, image: &Image) -> String {
     }
 }
 
-/// Why a texture has no picture.
+/// What a texture has for a picture that is not read.
 fn what_it_lacks(texture: &Texture) -> String {
-    let names: Vec<&str> = texture.extensions.keys().map(String::as_str).collect();
-    match (texture.source, &names[..]) {
-        (None, [_, ..]) => format!(
-            "has a picture by {} only, which is not read",
-            names.join(", ")
-        ),
-        _ => "has no picture".to_owned(),
+    match (texture.source, texture.extensions.keys().next()) {
+        (None, Some(extension)) => extension.clone(),
+        _ => "no picture".to_owned(),
     }
 }
 
@@ -158,6 +147,16 @@ fn wrap(document: &Document, texture: &Texture) -> [Wrap; 2] {
 }
 
 impl Reader<'_> {
+    /// The textures without a picture that is read, in whose place materials have their factors alone, counted by the extension that has one.
+    pub fn missing(&self) -> BTreeMap<String, usize> {
+        let mut missing = BTreeMap::new();
+        let textures = self.document.textures.iter().zip(&self.textures);
+        for (texture, _) in textures.filter(|(_, picture)| picture.is_none()) {
+            *missing.entry(what_it_lacks(texture)).or_default() += 1;
+        }
+        missing
+    }
+
     /// Material number `index`.
     pub fn material(&self, index: usize) -> Option<FileMaterial> {
         let m = self.document.materials.get(index)?;

@@ -14,7 +14,7 @@ use crate::surface::{MeshBuilder, NormalTransform};
 
 /// Codes of primitive modes.
 const POINTS: u32 = 0;
-const LINE_STRIP: u32 = 3;
+pub(super) const LINE_STRIP: u32 = 3;
 const TRIANGLES: u32 = 4;
 const STRIP: u32 = 5;
 const FAN: u32 = 6;

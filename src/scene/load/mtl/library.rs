@@ -1,11 +1,11 @@
 //! The material libraries of an OBJ file: each file is read once, and of its materials those that faces use.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::super::locate::Locator;
-use super::super::{FileMaterial, text};
+use super::super::{FileMaterial, Unused, text};
 use super::Reader;
 use crate::files::input;
 
@@ -131,8 +131,11 @@ impl<'a> Libraries<'a> {
         self.by_name.get(name).copied()
     }
 
-    /// The materials, the files that were read, and the warnings.
-    pub(in super::super) fn finish(mut self) -> (Vec<FileMaterial>, Vec<PathBuf>, Vec<String>) {
+    /// The materials, the files that were read, and the warnings; what has no effect is added to `unused`.
+    pub(in super::super) fn finish(
+        mut self,
+        unused: &mut Unused,
+    ) -> (Vec<FileMaterial>, Vec<PathBuf>, Vec<String>) {
         // Where no library could be read, that has been told.
         if !self.libraries.is_empty() {
             let missing = self
@@ -148,14 +151,19 @@ impl<'a> Libraries<'a> {
             names[index] = name;
         }
         let mut materials = Vec::new();
+        let mut others = BTreeMap::new();
         for (name, place) in names.into_iter().zip(&self.materials) {
             let library = &self.libraries[place.library];
             let mut reader = Reader {
                 library: &library.path,
                 locator: &mut self.locator,
                 warnings: &mut self.warnings,
+                others: &mut others,
             };
             materials.push(reader.material(name, &library.text[place.bytes.clone()], place.line));
+        }
+        for (keyword, &count) in &others {
+            unused.add_of(&text::shown(keyword), count, "material");
         }
         let files = self.libraries.into_iter().map(|library| library.path);
         (materials, files.collect(), shortened(self.warnings))

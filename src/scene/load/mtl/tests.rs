@@ -6,6 +6,7 @@ fn read(statements: &str) -> (FileMaterial, Vec<String>) {
         library: Path::new("lib/m.mtl"),
         locator: &mut Locator::default(),
         warnings: &mut warnings,
+        others: &mut BTreeMap::new(),
     };
     let material = reader.material("a".into(), statements.as_bytes(), 10);
     (material, warnings)

@@ -424,3 +424,27 @@ fn materials_say_what_they_are_made_of() {
     assert_eq!(pbr.roughness.texture.as_ref().unwrap().1, "g");
     assert!(matches!(pbr.detail, Some(FileDetail::NormalMap { .. })));
 }
+
+#[test]
+fn statements_that_have_no_effect_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = "newmtl a\nKa 1 1 1\nKd 1 1 1\nsharpness 60\nsharpness 70\nmap_Ks s.png\nnewmtl b\nsharpness 1\nnewmtl c\nodd 1\n";
+    std::fs::write(folder.path().join("m.mtl"), library).unwrap();
+    let path = folder.path().join("m.obj");
+    let load = |text: String| {
+        std::fs::write(&path, text).unwrap();
+        load_mesh(&path).unwrap().unused.to_string()
+    };
+    let told = load(format!(
+        "mtllib m.mtl\nmtllib m.mtl\n{SQUARE}v 0 0 0 1 0 0\ns 1\nusemtl a\nf 1 2 3\ns 2\nusemtl b\nf 1 3 2\nl 1 2\nl 2 3\np 1\ncstype bezier\n"
+    ));
+    assert_eq!(
+        told,
+        "no effect: colours of 1 vertex, 2 groups of smoothing, cstype of 1 line, l of 2 lines, p of 1 line, map_Ks of 1 material, \
+         sharpness of 2 materials"
+    );
+    // One group is what is done anyhow, and beside normals there is nothing to smooth.
+    for smoothing in ["s 1\n", "vn 0 0 1\ns 1\ns 2\n"] {
+        assert_eq!(load(format!("{SQUARE}{smoothing}f 1 2 3\n")), "no effect: ");
+    }
+}

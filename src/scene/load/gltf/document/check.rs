@@ -44,6 +44,7 @@ impl Document {
             ] {
                 maybe_leads(&place, what, found.map(|i| i as usize), count)?;
             }
+            maybe_leads(&place, "light", node.light(), self.lights().len())?;
             for accessor in node.instancing().iter().flat_map(|i| i.attributes.values()) {
                 leads(&place, "accessor", *accessor, self.accessors.len())?;
             }

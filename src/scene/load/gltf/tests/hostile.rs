@@ -42,9 +42,10 @@ fn full() -> (Value, Vec<u8>) {
             { "mesh": 0, "skin": 0, "rotation": [0, 0, 0, 1] },
             { "mesh": 1, "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": moved } } } },
             { "mesh": 2, "weights": [0.5] },
-            { "scale": [1, 2, 3] },
+            { "scale": [1, 2, 3], "extensions": { "KHR_lights_punctual": { "light": 0 } } },
         ],
-        "cameras": [{ "type": "perspective" }],
+        "cameras": [{ "type": "perspective", "perspective": { "yfov": 1, "znear": 1 } }],
+        "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "point" }] } },
         "meshes": [
             { "primitives": [{
                 "attributes": { "POSITION": corners, "TEXCOORD_0": texcoords, "JOINTS_0": joints, "WEIGHTS_0": weights },
@@ -76,7 +77,8 @@ fn full() -> (Value, Vec<u8>) {
 }
 
 /// Members whose number, or numbers, are indices.
-const INDICES: [&str; 26] = [
+const INDICES: [&str; 27] = [
+    "light",
     "scene",
     "nodes",
     "children",

@@ -36,22 +36,22 @@ fn a_picture_that_is_only_there_by_an_extension_is_read_or_missed() {
             FileTexture::Path(path) => path.file_name().unwrap().to_string_lossy().into_owned(),
             FileTexture::Embedded { .. } => panic!("pictures are files"),
         });
-        (name, file.warnings)
+        (name, file.unused)
     };
     let by = |extension: &str| json!({ extension: { "source": 1 } });
-    let (name, warnings) = load(json!({ "extensions": by("EXT_texture_webp") }));
-    assert_eq!((name.as_deref(), warnings.len()), (Some("other"), 0));
+    let (name, unused) = load(json!({ "extensions": by("EXT_texture_webp") }));
+    assert_eq!((name.as_deref(), unused.is_empty()), (Some("other"), true));
     for extension in ["KHR_texture_basisu", "MSFT_texture_dds"] {
-        let (name, warnings) = load(json!({ "extensions": by(extension) }));
-        assert!(
-            name.is_none() && warnings[0].contains(extension),
-            "{warnings:?}"
-        );
-        let (name, warnings) = load(json!({ "source": 0, "extensions": by(extension) }));
-        assert_eq!((name.as_deref(), warnings.len()), (Some("my color.png"), 0));
+        let (name, unused) = load(json!({ "extensions": by(extension) }));
+        let told = format!("no effect: {extension} of 1 texture");
+        assert_eq!((name, unused.to_string()), (None, told));
+        let (name, unused) = load(json!({ "source": 0, "extensions": by(extension) }));
+        let there = (name.as_deref(), unused.is_empty());
+        assert_eq!(there, (Some("my color.png"), true));
     }
-    let (name, warnings) = load(json!({}));
-    assert!(name.is_none() && warnings.len() == 1);
+    let (name, unused) = load(json!({}));
+    let told = "no effect: no picture of 1 texture".to_owned();
+    assert_eq!((name, unused.to_string()), (None, told));
 }
 
 #[test]
