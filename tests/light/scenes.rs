@@ -8,7 +8,7 @@ use prismarch::prism::{March, Prisms};
 use prismarch::render::film::{Frame, Objects};
 use prismarch::render::{Control, RenderInput, render_frame};
 use prismarch::scene::{
-    AovSet, Camera, Color, Film, Integrator, Light, Material, PathLimits, Scalar,
+    AovSet, Camera, Color, Film, Filter, FilterShape, Integrator, Light, Material, PathLimits, Scalar,
 };
 use prismarch::surface::{
     DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, ShadingNormals,
@@ -16,10 +16,14 @@ use prismarch::surface::{
 };
 use prismarch::trace::{Object, Placement, Shape, World};
 
+use super::reference::{Lamp, Matter};
+
 /// One displaced surface, and where it is seen from.
 pub struct Case {
     pub name: &'static str,
     pub surface: DisplacedSurface,
+    /// Triangles along a base triangle's side that the reference cuts it in.
+    pub cuts: usize,
     pub eye: Vec3,
     /// Vertical, radians.
     pub fov: f32,
@@ -51,6 +55,13 @@ fn soft(n: usize) -> Vec<u16> {
         ((h / 2.5 * 0.5 + 0.5) * 65535.0) as u16
     };
     (0..n * n).map(at).collect()
+}
+
+/// The same, level at the bottom and the top: for spheres, whose poles are drawn together there.
+fn soft_belt(n: usize) -> Vec<u16> {
+    let window = |i: usize| (std::f32::consts::PI * ((i / n) as f32 + 0.5) / n as f32).sin().powi(2);
+    let waves = soft(n).into_iter().enumerate();
+    waves.map(|(i, h)| (f32::from(h) * window(i)) as u16).collect()
 }
 
 /// The same surface as `texels` of `n` x `n` in `times` as many texels, which repeat.
@@ -116,78 +127,156 @@ fn surface(mesh: MeshBuilder, n: usize, texels: Vec<u16>, scale: f32) -> Displac
 }
 
 pub fn cases() -> Vec<Case> {
-    let above = |name, surface| Case {
+    let above = |name, surface, cuts| Case {
         name,
         surface,
+        cuts,
         eye: Vec3::new(1.2, 2.6, 2.2),
         fov: 0.5,
     };
-    let around = |name, surface| Case {
+    let around = |name, surface, cuts| Case {
         name,
         surface,
+        cuts,
         eye: Vec3::new(1.2, 2.6, 4.2),
         fov: 0.45,
     };
+    let upsampled = || upsampled(&noise(64), 64, 16);
     vec![
-        above("flat, noise", surface(plane(), 64, noise(64), 0.05)),
-        above(
-            "flat, noise upsampled 16x",
-            surface(plane(), 1024, upsampled(&noise(64), 64, 16), 0.05),
-        ),
-        above("flat, soft", surface(plane(), 128, soft(128), 0.2)),
-        around("curved, noise", surface(sphere(32, 16), 64, noise(64), 0.1)),
-        around("curved, soft", surface(sphere(32, 16), 128, soft(128), 0.2)),
-        around("coarse, soft", surface(sphere(10, 5), 128, soft(128), 0.2)),
-        around("coarse, none", surface(sphere(10, 5), 128, soft(128), 1e-4)),
+        above("flat, noise", surface(plane(), 64, noise(64), 0.05), 256),
+        above("flat, noise in 16x16 texels", surface(plane(), 1024, upsampled(), 0.05), 256),
+        above("flat, soft", surface(plane(), 128, soft(128), 0.2), 256),
+        around("curved, noise", surface(sphere(32, 16), 64, noise(64), 0.1), 16),
+        around("curved, soft", surface(sphere(32, 16), 128, soft_belt(128), 0.2), 16),
+        around("coarse, soft", surface(sphere(10, 5), 128, soft_belt(128), 0.2), 50),
     ]
 }
 
-/// The lights of the comparison.
-pub fn lights() -> Vec<(&'static str, Vec<Light>)> {
-    let sun = |name, direction: Vec3| {
-        let direction = direction.normalize();
-        let irradiance = Vec3::splat(3.0);
-        (
-            name,
-            vec![Light::Directional {
-                direction,
-                irradiance,
-            }],
-        )
+pub fn case(name: &str) -> Case {
+    cases().into_iter().find(|case| case.name == name).unwrap()
+}
+
+/// The renderer's light for one of the reference's; the square that shines may be a mesh.
+fn light(lamp: Lamp) -> Vec<Light> {
+    match lamp {
+        Lamp::Sky => vec![],
+        Lamp::Sun { to, irradiance } => vec![Light::Directional {
+            direction: to.as_vec3(),
+            irradiance: Vec3::splat(irradiance as f32),
+        }],
+        Lamp::Point { at, intensity } => vec![Light::Point {
+            position: at.as_vec3(),
+            intensity: Vec3::splat(intensity as f32),
+            range: f32::INFINITY,
+        }],
+        Lamp::Rectangle {
+            corner,
+            edges,
+            radiance,
+        } => vec![Light::Rectangle {
+            corner: corner.as_vec3(),
+            edges: edges.map(|e| e.as_vec3()),
+            radiance: Vec3::splat(radiance as f32),
+        }],
+    }
+}
+
+fn material(matter: Matter) -> Material {
+    let white = Material {
+        base_color: Color::Constant(Vec3::ONE),
+        specular: Scalar::Constant(0.0),
+        ..Material::default()
     };
-    vec![
-        ("environment", vec![]),
-        sun("sun in front", Vec3::new(0.6, 0.7, 0.4)),
-        sun("sun aside", Vec3::new(-0.8, 0.4, 0.3)),
-        sun("sun behind", Vec3::new(-0.3, 0.4, -0.8)),
-    ]
+    match matter {
+        Matter::Chalk(albedo) => Material {
+            base_color: Color::Constant(Vec3::splat(albedo as f32)),
+            ..white
+        },
+        Matter::Metal { alpha, reflectance } => Material {
+            base_color: Color::Constant(Vec3::splat(reflectance as f32)),
+            metallic: Scalar::Constant(1.0),
+            roughness: Scalar::Constant(alpha.sqrt() as f32),
+            ..white
+        },
+        Matter::Glass { index } => Material {
+            transmission: Scalar::Constant(1.0),
+            roughness: Scalar::Constant(0.0),
+            specular: Scalar::Constant(0.5),
+            ior: index as f32,
+            ..white
+        },
+    }
+}
+
+/// A square of a mesh that shines as a rectangle does.
+fn lamp_mesh(lamp: Lamp) -> Option<(Shape, Material)> {
+    let Lamp::Rectangle {
+        corner,
+        edges: [a, b],
+        radiance,
+    } = lamp
+    else {
+        return None;
+    };
+    let mesh = MeshBuilder {
+        positions: [corner, corner + a, corner + a + b, corner + b].map(|p| p.as_vec3()).to_vec(),
+        normals: vec![],
+        texcoords: vec![],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let (mesh, _) = mesh.build(NormalMode::File).unwrap();
+    let material = Material {
+        emission: Color::Constant(Vec3::splat(radiance as f32)),
+        ..material(Matter::Chalk(0.0))
+    };
+    Some((Shape::Triangles(Arc::new(mesh)), material))
+}
+
+/// A picture's settings.
+pub struct Look {
+    pub matter: Matter,
+    pub lamp: Lamp,
+    /// The lamp is a mesh that shines.
+    pub is_mesh: bool,
+    pub spp: u32,
 }
 
 /// The mean radiance of a case's picture over what is hit, by normals of a kind.
-pub fn mean(
-    case: &Case,
-    lights: &[Light],
-    normals: ShadingNormals,
-    material: &Material,
-    spp: u32,
-) -> f64 {
+pub fn mean(case: &Case, look: &Look, normals: ShadingNormals) -> f64 {
+    let covered = 1.0 - picture(case, &Look { matter: Matter::Chalk(0.0), lamp: Lamp::Sky, ..*look }, normals);
+    let behind = if matches!(look.lamp, Lamp::Sky) { 1.0 - covered } else { 0.0 };
+    (picture(case, look, normals) - behind) / covered
+}
+
+/// The mean radiance of a whole picture.
+fn picture(case: &Case, look: &Look, normals: ShadingNormals) -> f64 {
     let surface = case.surface.clone().with_shading_normals(normals);
     let prisms = Prisms::new(Arc::new(surface), March::Exact).unwrap();
-    let world = World::new(vec![Object {
-        shape: Shape::Displaced(Arc::new(prisms)),
+    let mut shapes = vec![(Shape::Displaced(Arc::new(prisms)), material(look.matter))];
+    let mut lights = light(look.lamp);
+    if look.is_mesh && let Some(mesh) = lamp_mesh(look.lamp) {
+        shapes.push(mesh);
+        lights.clear();
+    }
+    let (shapes, materials): (Vec<_>, Vec<_>) = shapes.into_iter().unzip();
+    let object = |shape| Object {
+        shape,
         placement: Placement::World,
         mask: u32::MAX,
-    }]);
+    };
+    let world = World::new(shapes.into_iter().map(object).collect());
     let tracer = BvhTracer::new(&world).unwrap();
     let camera = Camera {
         position: case.eye,
         target: Vec3::ZERO,
+        fov: case.fov,
         ..Camera::default()
     };
     let film = Film {
         width: SIDE,
         height: SIDE,
-        spp,
+        spp: look.spp,
+        filter: Filter { shape: FilterShape::Box, radius: 0.5 },
         aovs: AovSet::NONE,
         ..Film::default()
     };
@@ -202,21 +291,13 @@ pub fn mean(
         surfaces: &world,
         camera: &camera,
         film: &film,
-        materials: std::slice::from_ref(material),
-        object_materials: &[0],
-        lights,
+        materials: &materials,
+        object_materials: &(0..materials.len()).collect::<Vec<_>>(),
+        lights: &lights,
         integrator: &integrator,
     };
     let mut frame = Frame::new(&film, 0..film.spp, Objects::default());
     render_frame(&input, &mut frame, Control::default());
     let pixels = frame.radiance();
     pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / pixels.len() as f64
-}
-
-pub fn chalk(albedo: f32) -> Material {
-    Material {
-        base_color: Color::Constant(Vec3::splat(albedo)),
-        specular: Scalar::Constant(0.0),
-        ..Material::default()
-    }
 }
