@@ -7,6 +7,7 @@ mod demo;
 mod engine;
 mod error;
 mod film;
+mod heading;
 mod hits;
 mod info;
 mod interrupt;
@@ -21,6 +22,7 @@ mod query;
 mod rays;
 mod render;
 mod stats;
+mod surface;
 
 use std::process::ExitCode;
 

@@ -29,22 +29,12 @@ pub(super) fn bounds(objects: &[SceneObject]) -> Aabb {
             return own;
         }
         let placed = object.instances.iter().flat_map(|transform| {
-            corners(own).map(|p| Vec3::from(transform.transform_point3a(Vec3A::from(p))))
+            own.corners()
+                .map(|p| Vec3::from(transform.transform_point3a(Vec3A::from(p))))
         });
         placed.fold(Aabb::EMPTY, Aabb::including)
     };
     objects.iter().map(object).fold(Aabb::EMPTY, Aabb::union)
-}
-
-fn corners(Aabb { min, max }: Aabb) -> [Vec3; 8] {
-    std::array::from_fn(|i| {
-        let pick = |bit: usize, low: f32, high: f32| if i & bit == 0 { low } else { high };
-        Vec3::new(
-            pick(1, min.x, max.x),
-            pick(2, min.y, max.y),
-            pick(4, min.z, max.z),
-        )
-    })
 }
 
 /// The camera of a file, framed where it says nothing.

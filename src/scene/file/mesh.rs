@@ -4,9 +4,12 @@ use std::path::{Path, PathBuf};
 
 use glam::{Affine3A, EulerRot, Quat, Vec3};
 
-use super::{Item, Keyed, STEP_TEXELS, SceneError, channel, file_path, keyed, uv_transform, wrap};
+use super::{
+    Item, Keyed, STEP_TEXELS, SceneError, Section, channel, file_path, keyed, uv_transform, wrap,
+};
 use crate::image::Channel;
 use crate::prism::{EditBounds, Lod, March, PrismOptions, Step};
+use crate::scene::load::Shape;
 use crate::surface::{Projection, Seams, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
@@ -14,7 +17,7 @@ pub(in crate::scene) const SCALE: &str =
     "world units from height 0 to height 1: a number other than 0";
 
 /// The words for where texture coordinates come from.
-const TEXCOORDS: [(&str, Option<Projection>); 5] = [
+pub(in crate::scene) const TEXCOORDS: [(&str, Option<Projection>); 5] = [
     ("file", None),
     ("box", Some(Projection::Box)),
     ("spherical", Some(Projection::Spherical)),
@@ -27,7 +30,10 @@ const TEXCOORDS: [(&str, Option<Projection>); 5] = [
 pub(in crate::scene) struct MeshTable {
     /// Default: the file's stem.
     pub name: Option<String>,
+    /// Of a built-in shape its word, which names it in messages as a path does a file.
     pub file: Keyed<PathBuf>,
+    /// Instead of a file.
+    pub shape: Option<Shape>,
     /// Compute normals even where the file has some.
     pub recompute_normals: bool,
     /// Radians, for computed normals.
@@ -67,6 +73,7 @@ impl MeshTable {
         let mut section = item.section(&[
             "name",
             "file",
+            "shape",
             "normals",
             "crease_angle",
             "join",
@@ -77,11 +84,12 @@ impl MeshTable {
             "instances",
             "displacement",
         ])?;
-        let file = section.require("file", "the path of a mesh file")?;
+        let (file, shape) = source(&mut section, folder)?;
         let modes = [("file", false), ("smooth", true)];
         Ok(Self {
             name: section.optional("name", |i| Ok(i.text("a name, in quotes")?.to_owned()))?,
-            file: file_path(&file, folder)?,
+            file,
+            shape,
             recompute_normals: section
                 .optional("normals", |i| i.word(&modes))?
                 .unwrap_or(false),
@@ -112,6 +120,23 @@ impl MeshTable {
                 .optional("displacement", |i| DisplacementTable::read(i, folder))?,
         })
     }
+}
+
+/// `file`, or `shape` in its place.
+fn source(
+    section: &mut Section,
+    folder: &Path,
+) -> Result<(Keyed<PathBuf>, Option<Shape>), SceneError> {
+    let Some(item) = section.get("shape") else {
+        let file = section.require("file", "the path of a mesh file, or shape = \"plane\"")?;
+        return Ok((file_path(&file, folder)?, None));
+    };
+    if section.get("file").is_some() {
+        return Err(item.error("a file and a shape", "only one of them"));
+    }
+    let word = item.text("the name of a shape, like \"plane\"")?;
+    let named = keyed(&item, PathBuf::from(word));
+    Ok((named, Some(item.word(&Shape::NAMES)?)))
 }
 
 impl DisplacementTable {
@@ -164,7 +189,7 @@ fn one_wrap(item: Item) -> Result<Wrap, SceneError> {
     wrap(item)
 }
 
-fn seams(section: &mut super::Section, march: March) -> Result<Option<Seams>, SceneError> {
+fn seams(section: &mut Section, march: March) -> Result<Option<Seams>, SceneError> {
     let Some(item) = section.get("seams") else {
         return Ok(None);
     };
@@ -179,7 +204,7 @@ fn seams(section: &mut super::Section, march: March) -> Result<Option<Seams>, Sc
     Ok(Some(seams))
 }
 
-fn lod(section: &mut super::Section, march: March) -> Result<Lod, SceneError> {
+fn lod(section: &mut Section, march: March) -> Result<Lod, SceneError> {
     let Some(item) = section.get("lod") else {
         return Ok(Lod::Off);
     };
@@ -195,7 +220,7 @@ fn lod(section: &mut super::Section, march: March) -> Result<Lod, SceneError> {
 }
 
 /// `march`, and what belongs to the uniform one: a step or its jitter choose it where no march is named.
-fn march(section: &mut super::Section) -> Result<March, SceneError> {
+fn march(section: &mut Section) -> Result<March, SceneError> {
     let words = [("exact", false), ("uniform", true)];
     let uniform = section.optional("march", |i| i.word(&words))?;
     if uniform == Some(false) {
@@ -218,7 +243,7 @@ fn march(section: &mut super::Section) -> Result<March, SceneError> {
 }
 
 /// `dt` or `dt_world`.
-fn step(section: &mut super::Section) -> Result<Option<Step>, SceneError> {
+fn step(section: &mut Section) -> Result<Option<Step>, SceneError> {
     let texels = section.optional("dt", |i| {
         let (low, high) = (STEP_TEXELS.start(), STEP_TEXELS.end());
         let expected = format!("texels per step, from {low} to {high}");

@@ -13,6 +13,7 @@ mod mtl;
 mod obj;
 mod ply;
 mod polygon;
+mod shape;
 mod text;
 
 use std::collections::HashMap;
@@ -27,6 +28,7 @@ use crate::surface::{MeshBuilder, Projection};
 pub use material::{
     FileColor, FileDetail, FileDisplacement, FileMaterial, FileScalar, FileTexture, FileTextureUse,
 };
+pub(super) use shape::Shape;
 
 /// Endings of the files that [`load_mesh`] reads.
 pub const MESH_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
