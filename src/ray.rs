@@ -137,6 +137,14 @@ impl Aabb {
         }
     }
 
+    /// What both hold; not [valid](Self::is_valid) if that is nothing.
+    pub fn intersection(self, other: Self) -> Self {
+        Self {
+            min: self.min.max(other.min),
+            max: self.max.min(other.max),
+        }
+    }
+
     /// The eight corners.
     pub fn corners(self) -> [Vec3; 8] {
         let Self { min, max } = self;

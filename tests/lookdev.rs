@@ -72,19 +72,13 @@ fn the_mesh_is_whole_in_the_picture_and_large_in_it() {
             "back --orbit 130,25",
         ] {
             let line = format!(
-                "render pyramid.obj --texcoords box --displacement bumps.png --view {view} --size {size} --spp 4 -o p.exr -q"
+                "render pyramid.obj --texcoords box --displacement bumps.png --view {view} --size {size} --spp 4 --filter box -o p.exr -q"
             );
             done(&folder, &line);
             let (_, channels) = pixels(&folder, "p.exr");
             let width: usize = size[..2].parse().unwrap();
-            let seen: Vec<bool> = channels["Z"]
-                .iter()
-                .map(|&z| {
-                    f32::from_bits(z).is_finite()
-                        && f32::from_bits(z) > 0.0
-                        && f32::from_bits(z) < 1e9
-                })
-                .collect();
+            let alpha = channels["A"].iter().map(|&bits| f32::from_bits(bits));
+            let seen: Vec<bool> = alpha.map(|alpha| alpha > 0.0).collect();
             let height = seen.len() / width;
             let at = |x: usize, y: usize| seen[y * width + x];
             let columns = (0..width)
@@ -97,7 +91,7 @@ fn the_mesh_is_whole_in_the_picture_and_large_in_it() {
                 || (0..height).any(|y| at(0, y) || at(width - 1, y));
             assert!(!border, "{line}");
             let filled = (columns as f64 / width as f64).max(rows as f64 / height as f64);
-            assert!(filled > 0.75, "{line}: {filled}");
+            assert!(filled > 0.7, "{line}: {filled}");
         }
     }
 }

@@ -22,6 +22,7 @@ use crate::surface::{
     Projection, Seams, SurfaceError, Wrap,
 };
 pub(super) use assets::Assets;
+pub(super) use frame::reach;
 
 /// A displacement map and the file it is from, for reports.
 #[derive(Clone, Debug)]

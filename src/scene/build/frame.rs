@@ -6,6 +6,7 @@ use crate::ray::Aabb;
 use crate::scene::error::SceneError;
 use crate::scene::file::{CameraTable, ProjectionTable};
 use crate::scene::{Camera, Lens, ObjectShape, Projection, SceneObject};
+use crate::surface::DisplacedSurface;
 
 /// From the middle of the scene to the eye: half from the right, a little from above.
 const THREE_QUARTER: Vec3 = Vec3::new(0.55, 0.45, 1.0);
@@ -13,17 +14,9 @@ const THREE_QUARTER: Vec3 = Vec3::new(0.55, 0.45, 1.0);
 /// The box over all objects where they stand, grown by how far they are displaced.
 pub(super) fn bounds(objects: &[SceneObject]) -> Aabb {
     let object = |object: &SceneObject| {
-        let (mesh, reach) = match &object.shape {
-            ObjectShape::Displaced(surface, _) => {
-                let (low, high) = surface.range();
-                (surface.mesh(), low.abs().max(high.abs()))
-            }
-            ObjectShape::Plain(mesh) => (mesh, 0.0),
-        };
-        let Aabb { min, max } = mesh.bounds();
-        let own = Aabb {
-            min: min - reach,
-            max: max + reach,
+        let own = match &object.shape {
+            ObjectShape::Displaced(surface, _) => reach(surface),
+            ObjectShape::Plain(mesh) => mesh.bounds(),
         };
         if object.instances.is_empty() {
             return own;
@@ -35,6 +28,17 @@ pub(super) fn bounds(objects: &[SceneObject]) -> Aabb {
         placed.fold(Aabb::EMPTY, Aabb::including)
     };
     objects.iter().map(object).fold(Aabb::EMPTY, Aabb::union)
+}
+
+/// The box around a mesh, as far as it could be displaced in any direction.
+pub(in crate::scene) fn reach(surface: &DisplacedSurface) -> Aabb {
+    let (low, high) = surface.range();
+    let reach = low.abs().max(high.abs());
+    let Aabb { min, max } = surface.mesh().bounds();
+    Aabb {
+        min: min - reach,
+        max: max + reach,
+    }
 }
 
 /// The camera of a file, framed where it says nothing.

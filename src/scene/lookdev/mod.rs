@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::build::{Assets, displaced};
+use super::build::{Assets, displaced, reach};
 use super::file::SceneFile;
 use super::load::LoadOptions;
 use super::{AssetError, Loaded, ObjectShape, Scene, SceneError, SceneObject};
@@ -394,7 +394,10 @@ impl Draft<'_> {
                     let mesh = surface.mesh().clone();
                     let surface = displaced(&object.name, mesh, map, displacement)?;
                     let prisms = Prisms::new(Arc::new(surface), PrismOptions::default())?;
-                    (0..prisms.len() as u32).map(|p| prisms.bounds(p)).collect()
+                    // A block's own box is wide where normals all but cancel each other.
+                    let farthest = reach(prisms.surface());
+                    let blocks = (0..prisms.len() as u32).map(|p| prisms.bounds(p));
+                    blocks.map(|block| block.intersection(farthest)).collect()
                 }
                 ObjectShape::Plain(mesh) => {
                     let points = mesh.positions().iter();
