@@ -65,7 +65,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Verb {
     Demo(demo::Args),
-    Render(render::Args),
+    Render(Box<render::Args>),
     Merge(merge::Args),
     Info(info::Args),
     Query(query::Args),

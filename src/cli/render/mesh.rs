@@ -1,7 +1,7 @@
 //! A mesh and its maps on the command line, in place of a scene file.
 
 use std::ffi::OsStr;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
@@ -12,7 +12,7 @@ use crate::cli::error::CliError;
 use crate::cli::heading::{MESH, PICTURE, STAGE};
 use crate::cli::parse;
 use crate::cli::surface::{TexcoordKind, WrapKind};
-use crate::files::{Outputs, output};
+use crate::files::{Outputs, input, output};
 use crate::scene::Loaded;
 use crate::scene::load::MESH_EXTENSIONS;
 use crate::scene::lookdev::{Amount, Light, Lookdev, Made, Maps, Place, TextureSet, View};
@@ -97,38 +97,43 @@ pub enum NormalKind {
     Smooth,
 }
 
-/// Endings of files that are known to be no scenes; `.toml` is not the only one that scenes have.
-const FOREIGN: [&str; 27] = [
-    "3ds", "abc", "blend", "bmp", "c4d", "dae", "exr", "fbx", "hdr", "jpeg", "jpg", "ma", "max",
-    "mb", "off", "png", "stl", "tga", "tif", "tiff", "usd", "usda", "usdc", "usdz", "webp", "x3d",
-    "ztl",
+/// Endings of meshes that are not read; a scene may have any other.
+const FOREIGN: [&str; 17] = [
+    "3ds", "abc", "blend", "c4d", "dae", "fbx", "ma", "max", "mb", "off", "stl", "usd", "usda",
+    "usdc", "usdz", "x3d", "ztl",
 ];
 
 impl MeshArgs {
-    /// What is to be made of the file `input`, if that is a mesh.
-    pub fn lookdev(&self, input: &Path, quiet: bool) -> Result<Option<Lookdev>, CliError> {
+    /// What is to be made of the file `named`, if that is a mesh.
+    pub fn lookdev(&self, named: &Path, quiet: bool) -> Result<Option<Lookdev>, CliError> {
         let meshes = MESH_EXTENSIONS
             .map(|ending| format!(".{ending}"))
             .join(", ");
         let expected = format!("expected a scene file (.toml) or a mesh ({meshes})");
-        let ending = input.extension().map(OsStr::to_string_lossy);
+        let ending = named.extension().map(OsStr::to_string_lossy);
         let ending = ending.unwrap_or_default().to_lowercase();
         if MESH_EXTENSIONS.contains(&&ending[..]) {
-            return self.of_mesh(input, quiet).map(Some);
+            return self.of_mesh(named, quiet).map(Some);
         }
-        let path = input.display();
-        if input.is_dir() {
+        let path = named.display();
+        if named.is_dir() {
             let hint = "a folder of maps is given with --displacement, beside a mesh";
             return Err(CliError::Input(format!(
-                "{path} is a folder; {expected}; {hint}"
+                "{path}: it is a folder; {expected}; {hint}"
             )));
         }
         let given = self.given();
         let is_scene = ending.is_empty() || ending == "toml";
-        if FOREIGN.contains(&&ending[..]) || (given.is_some() && !is_scene) {
+        let is_foreign = FOREIGN.contains(&&ending[..]) || is_binary(named);
+        if is_foreign || (given.is_some() && !is_scene) {
+            let found = if is_scene {
+                "no text".into()
+            } else {
+                format!(".{ending}")
+            };
             let hint = "export a mesh as one of these; a map is given with --displacement";
             return Err(CliError::Input(format!(
-                "{path}: found .{ending}; {expected}; {hint}"
+                "{path}: found {found}; {expected}; {hint}"
             )));
         }
         given.map_or(Ok(None), |option| {
@@ -248,6 +253,13 @@ impl MeshArgs {
             normal_map: file(&self.normal_map, found.normal_map),
         })
     }
+}
+
+/// Whether a file begins as no text does; one that cannot be read is left to who reads it.
+fn is_binary(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = input::open(path).and_then(|file| file.take(512).read_to_end(&mut start));
+    read.is_ok() && start.contains(&0)
 }
 
 /// Says which maps are taken.

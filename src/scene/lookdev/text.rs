@@ -463,7 +463,8 @@ mod tests {
                 let table: toml::Table = text.parse().unwrap();
                 let read = table["x"].as_float().unwrap();
                 assert!(
-                    (read - f64::from(x)).abs() <= 2e-4 * f64::from(size),
+                    (read - f64::from(x)).abs()
+                        <= 1e-4 * f64::from(size) + 1e-7 * f64::from(x.abs()),
                     "{text}"
                 );
             }
