@@ -137,6 +137,27 @@ impl Aabb {
         }
     }
 
+    /// What both hold; not [valid](Self::is_valid) if that is nothing.
+    pub fn intersection(self, other: Self) -> Self {
+        Self {
+            min: self.min.max(other.min),
+            max: self.max.min(other.max),
+        }
+    }
+
+    /// The eight corners.
+    pub fn corners(self) -> [Vec3; 8] {
+        let Self { min, max } = self;
+        std::array::from_fn(|i| {
+            let pick = |bit: usize, low: f32, high: f32| if i & bit == 0 { low } else { high };
+            Vec3::new(
+                pick(1, min.x, max.x),
+                pick(2, min.y, max.y),
+                pick(4, min.z, max.z),
+            )
+        })
+    }
+
     /// True when it holds at least one point.
     pub fn is_valid(&self) -> bool {
         self.min.cmple(self.max).all()

@@ -51,14 +51,62 @@ fn off(name: &str, matter: Matter, lamp: Lamp, is_mesh: bool) -> [f64; 2] {
         is_mesh,
         spp: 64,
     };
-    let kinds = [ShadingNormals::Geometric, ShadingNormals::Smooth, ShadingNormals::Paper];
+    let kinds = [
+        ShadingNormals::Geometric,
+        ShadingNormals::Smooth,
+        ShadingNormals::Paper,
+    ];
     let off = kinds.map(|normals| mean(case, &look, normals) / truth - 1.0);
-    println!("{name} {truth:.4} {:+.2} {:+.2} {:+.2}", 100.0 * off[0], 100.0 * off[1], 100.0*off[2]);
+    println!(
+        "{name} {truth:.4} {:+.2} {:+.2} {:+.2}",
+        100.0 * off[0],
+        100.0 * off[1],
+        100.0 * off[2]
+    );
     [off[0], off[1]]
 }
 #[test]
-fn a() { for n in ["flat, noise","flat, noise in 16x16 texels","flat, soft","curved, noise","curved, soft","coarse, soft"] { off(n, CHALK, Lamp::Sky, false);  off(n, CHALK, in_front(), false);  off(n, CHALK, aside(), false); } }
+fn a() {
+    for n in [
+        "flat, noise",
+        "flat, noise in 16x16 texels",
+        "flat, soft",
+        "curved, noise",
+        "curved, soft",
+        "coarse, soft",
+    ] {
+        off(n, CHALK, Lamp::Sky, false);
+        off(n, CHALK, in_front(), false);
+        off(n, CHALK, aside(), false);
+    }
+}
 #[test]
-fn b() { let n = "curved, soft"; println!("b"); off(n, CHALK, POINT, false);  off(n, CHALK, SQUARE, false);  off(n, CHALK, SQUARE, true);
- println!("metal"); off(n, Matter::Metal{alpha:0.16,reflectance:0.9}, SQUARE, false);   off(n, Matter::Metal{alpha:0.16,reflectance:0.9}, Lamp::Sky, false);  println!("glass");off(n, Matter::Glass{index:1.5}, SQUARE, false); 
- off(n, Matter::Glass{index:1.5}, Lamp::Sky, false); }
+fn b() {
+    let n = "curved, soft";
+    println!("b");
+    off(n, CHALK, POINT, false);
+    off(n, CHALK, SQUARE, false);
+    off(n, CHALK, SQUARE, true);
+    println!("metal");
+    off(
+        n,
+        Matter::Metal {
+            alpha: 0.16,
+            reflectance: 0.9,
+        },
+        SQUARE,
+        false,
+    );
+    off(
+        n,
+        Matter::Metal {
+            alpha: 0.16,
+            reflectance: 0.9,
+        },
+        Lamp::Sky,
+        false,
+    );
+    println!("glass");
+    off(n, Matter::Glass { index: 1.5 }, SQUARE, false);
+    off(n, Matter::Glass { index: 1.5 }, Lamp::Sky, false);
+}

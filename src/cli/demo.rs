@@ -12,7 +12,7 @@ use super::render::Job;
 use super::watch::WatchArgs;
 use crate::demo::{DEMOS, Demo, WriteOptions, digest};
 use crate::files::Outputs;
-use crate::scene::load::LoadOptions;
+use crate::scene::Loaded;
 
 /// Make a ready scene and a picture of it
 ///
@@ -96,8 +96,7 @@ fn render(args: &Args, scene: &Path, picture: &Path) -> Result<(), CliError> {
         outputs,
         scene,
         film: &args.film,
-        set: &[],
-        load: LoadOptions::default(),
+        load: &|| Ok(Loaded::from_file(scene)?),
         integrator: None,
         samples: None,
         resume: false,

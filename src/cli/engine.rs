@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 
 use super::error::CliError;
+use super::heading::MACHINE;
 use crate::trace::{Tracer, World};
 
 /// Most threads that may be asked for.
@@ -12,10 +13,10 @@ const MAX_THREADS: i64 = 1024;
 #[derive(Clone, Debug, clap::Args)]
 pub struct EngineArgs {
     /// What finds the prisms
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = MACHINE)]
     pub backend: Backend,
     /// Threads, for building and tracing [default: all cores]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_THREADS))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_THREADS), help_heading = MACHINE)]
     pub threads: Option<u16>,
 }
 

@@ -12,6 +12,7 @@ use crate::demo::WriteDemoError;
 use crate::files::OutputError;
 use crate::prism::MarchError;
 use crate::render::film::FrameError;
+use crate::scene::lookdev::LookdevError;
 use crate::scene::{AssetError, SceneError, UntraceableError};
 
 /// Exit code of wrong usage; clap's own.
@@ -26,6 +27,12 @@ pub enum CliError {
     /// The command line asks for what cannot be.
     #[error("{0}")]
     Usage(String),
+    /// What is given is no file that is read.
+    #[error("{0}")]
+    Input(String),
+    /// A mesh and maps that make no scene.
+    #[error(transparent)]
+    Lookdev(#[from] LookdevError),
     /// A scene file, or what it names.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -121,9 +128,12 @@ impl CliError {
         match self {
             Self::Usage(_) | Self::PictureFormat { .. } => USAGE,
             Self::Scene(error) if error.is_override() => USAGE,
+            Self::Lookdev(error) if error.is_usage() => USAGE,
             Self::Output(error) if error.is_usage() => USAGE,
             Self::Demo(WriteDemoError::Foreign { .. }) => USAGE,
-            Self::Scene(_)
+            Self::Input(_)
+            | Self::Lookdev(_)
+            | Self::Scene(_)
             | Self::Asset(_)
             | Self::March(_)
             | Self::Untraceable(_)

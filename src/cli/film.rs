@@ -3,6 +3,7 @@
 use clap::value_parser;
 
 use super::error::CliError;
+use super::heading::{PARTS, PICTURE, QUALITY};
 use super::parse::{self, Limit, Size};
 use crate::scene::{Adaptive, AovSet, Film, Filter, FilterShape, MAX_SPP, ToneCurve, Window, fits};
 
@@ -10,37 +11,37 @@ use crate::scene::{Adaptive, AovSet, Film, Filter, FilterShape, MAX_SPP, ToneCur
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct FilmArgs {
     /// Width and height in pixels, instead of the scene's
-    #[arg(long, value_name = "WxH", value_parser = parse::size)]
+    #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = PICTURE)]
     pub size: Option<Size>,
     /// Part of the picture to render: columns x0 to x1 - 1 of rows y0 to y1 - 1, from the top left
-    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse::window)]
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse::window, help_heading = PARTS)]
     pub crop: Option<Window>,
     /// Samples per pixel, instead of the scene's
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SPP)))]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SPP)), help_heading = QUALITY)]
     pub spp: Option<u32>,
     /// Seed of all randomness, instead of the scene's
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = QUALITY)]
     pub seed: Option<u32>,
     /// Reconstruction filter, instead of the scene's
-    #[arg(long, value_name = "SHAPE", value_parser = parse::word(FilterShape::NAMES))]
+    #[arg(long, value_name = "SHAPE", value_parser = parse::word(FilterShape::NAMES), help_heading = QUALITY)]
     pub filter: Option<FilterShape>,
     /// Half the filter's width in pixels [default: the scene's, or what is usual for --filter]
-    #[arg(long, value_name = "PIXELS", value_parser = parse::filter_radius)]
+    #[arg(long, value_name = "PIXELS", value_parser = parse::filter_radius, help_heading = QUALITY)]
     pub filter_radius: Option<f32>,
     /// Scale samples down whose largest component is above this; "off" leaves them
-    #[arg(long, value_name = "RADIANCE", value_parser = parse::limit)]
+    #[arg(long, value_name = "RADIANCE", value_parser = parse::limit, help_heading = QUALITY)]
     pub clamp: Option<Limit>,
     /// End pixels early whose error is below this, like 0.02; "off" gives all the same samples
-    #[arg(long, value_name = "ERROR", value_parser = parse::limit)]
+    #[arg(long, value_name = "ERROR", value_parser = parse::limit, help_heading = QUALITY)]
     pub adaptive_threshold: Option<Limit>,
     /// Samples before a pixel may end, and between two looks [default: the scene's, or 16]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(2..=i64::from(MAX_SPP)))]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(2..=i64::from(MAX_SPP)), help_heading = QUALITY)]
     pub adaptive_min_spp: Option<u32>,
     /// Take samples in passes over the whole picture, and write the picture after each
-    #[arg(long)]
+    #[arg(long, help_heading = QUALITY)]
     pub progressive: bool,
     /// What EXR files hold beside the picture: names with commas between, "all" or "none"
-    #[arg(long, value_name = "NAMES", value_parser = parse::aovs)]
+    #[arg(long, value_name = "NAMES", value_parser = parse::aovs, help_heading = PICTURE)]
     pub aovs: Option<AovSet>,
     #[command(flatten)]
     pub tone: ToneArgs,
@@ -50,10 +51,10 @@ pub struct FilmArgs {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ToneArgs {
     /// Stops brighter, for PNG files
-    #[arg(long, value_name = "STOPS", value_parser = parse::stops, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", value_parser = parse::stops, allow_negative_numbers = true, help_heading = PICTURE)]
     pub exposure: Option<f32>,
     /// Tone curve of PNG files
-    #[arg(long, value_name = "CURVE", value_parser = parse::word(ToneCurve::NAMES))]
+    #[arg(long, value_name = "CURVE", value_parser = parse::word(ToneCurve::NAMES), help_heading = PICTURE)]
     pub tone: Option<ToneCurve>,
 }
 

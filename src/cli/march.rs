@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 
 use super::error::CliError;
+use super::heading::TRACING;
 use super::parse;
 use crate::prism::{Lod, March, Step};
 use crate::scene::{ObjectShape, Scene};
@@ -11,19 +12,19 @@ use crate::scene::{ObjectShape, Scene};
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct MarchArgs {
     /// How the surface is looked for inside a prism [default: the scene's, or exact; uniform with a step]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = TRACING)]
     march: Option<MarchKind>,
     /// Step of the uniform march in texels of the map [default: the scene's, or 1]
-    #[arg(long, value_name = "TEXELS", value_parser = parse::texels)]
+    #[arg(long, value_name = "TEXELS", value_parser = parse::texels, help_heading = TRACING)]
     dt: Option<f32>,
     /// Step of the uniform march in world units
-    #[arg(long, value_name = "LENGTH", value_parser = parse::length, conflicts_with = "dt")]
+    #[arg(long, value_name = "LENGTH", value_parser = parse::length, conflicts_with = "dt", help_heading = TRACING)]
     dt_world: Option<f32>,
     /// Level of detail: "cone" lets a hit be off by half a pixel and shades with the mean over one [default: the scene's, or off]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = TRACING)]
     lod: Option<LodKind>,
     /// Angle of one pixel for --lod cone, radians: the growth of a ray's cone per unit of length [default: the camera's]
-    #[arg(long, value_name = "RADIANS", value_parser = parse::spread)]
+    #[arg(long, value_name = "RADIANS", value_parser = parse::spread, help_heading = TRACING)]
     spread: Option<f32>,
 }
 

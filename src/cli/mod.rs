@@ -3,14 +3,17 @@
 //! Exit codes: 0 done, 1 the machine failed us, 2 usage, 3 bad input, 4 output, 128 + n interrupted by signal n. Results go to stdout, everything else
 //! to stderr. Files appear complete or not at all.
 
+mod completions;
 mod demo;
 mod engine;
 mod error;
 mod film;
+mod heading;
 mod hits;
 mod info;
 mod interrupt;
 mod load;
+mod man;
 mod march;
 mod memory;
 mod merge;
@@ -22,12 +25,13 @@ mod query;
 mod rays;
 mod render;
 mod stats;
+mod surface;
 mod tev;
 mod watch;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Command, CommandFactory, Parser, Subcommand};
 
 use crate::files::keep_caught_panics_quiet;
 use error::CliError;
@@ -36,6 +40,8 @@ use error::CliError;
 const AFTER_HELP: &str = "\
 Examples:
   prismarch demo                                   make a cratered asteroid and a picture of it
+  prismarch render rock.obj --displacement h.png   a picture of a mesh under its displacement map
+  prismarch render rock.obj --displacement h.png --save scene.toml
   prismarch render scene.toml -o rock.png          render a scene
   prismarch merge a.exr b.exr -o whole.exr         put parts of a picture together
   prismarch info scene.toml                        triangles, maps, memory
@@ -45,12 +51,15 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input, 4 output could not be 
 128 + n interrupted by signal n (what is done is written).
 `prismarch VERB --help` tells more of a verb.";
 
+/// What the program is called.
+const NAME: &str = "prismarch";
+
 /// Ray traces displaced surfaces without tessellating them.
 ///
 /// A low-poly mesh and a displacement map are traced directly: no micro-triangles, 108 bytes per base triangle
 /// and 32 per block of up to 32x32 texels beside the map.
 #[derive(Parser)]
-#[command(name = "prismarch", version, after_help = AFTER_HELP)]
+#[command(name = NAME, version, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
@@ -58,11 +67,18 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Verb {
-    Render(render::Args),
-    Merge(merge::Args),
-    Query(query::Args),
-    Info(info::Args),
     Demo(demo::Args),
+    Render(Box<render::Args>),
+    Merge(merge::Args),
+    Info(info::Args),
+    Query(query::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// All verbs and options.
+fn command() -> Command {
+    Cli::command()
 }
 
 /// Runs the program on the process's arguments.
@@ -88,6 +104,8 @@ fn run(verb: Verb) -> Result<(), CliError> {
         Verb::Query(args) => query::run(&args),
         Verb::Info(args) => info::run(&args),
         Verb::Demo(args) => demo::run(&args),
+        Verb::Completions(args) => completions::run(&args),
+        Verb::Man(args) => man::run(&args),
     }
 }
 

@@ -3,9 +3,10 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use glam::UVec2;
+use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
+use glam::{UVec2, Vec2};
 
+use super::render::Given;
 use crate::scene::{
     Aov, AovSet, Filter, MAX_SIDE, MAX_SPP, MAX_STOPS, STEP_TEXELS, Window, too_many_pixels,
 };
@@ -124,6 +125,49 @@ pub fn scale(text: &str) -> Result<f32, String> {
     number.ok_or_else(|| "expected a finite number other than 0".into())
 }
 
+/// The path of a picture, or `none`.
+pub fn file_or_none() -> impl TypedValueParser<Value = Given> {
+    PathBufValueParser::new().map(|path| match path.to_str() {
+        Some("none") => Given::Nothing,
+        _ => Given::File(path),
+    })
+}
+
+/// The same, or a number from 0 to 1.
+pub fn amount() -> impl TypedValueParser<Value = Given> {
+    PathBufValueParser::new().try_map(|path| {
+        let number = path.to_str().and_then(|text| text.parse::<f32>().ok());
+        match (path.to_str(), number) {
+            (Some("none"), _) => Ok(Given::Nothing),
+            (_, Some(x)) if (0.0..=1.0).contains(&x) => Ok(Given::Number(x)),
+            (_, Some(_)) => Err("expected a number from 0 to 1, or the path of a picture"),
+            _ => Ok(Given::File(path)),
+        }
+    })
+}
+
+/// One number above 0, or two with a comma between.
+pub fn repeats(text: &str) -> Result<Vec2, String> {
+    let expected = "expected how often the maps repeat, above 0: X or X,Y";
+    let numbers: Option<Vec<f32>> = text.split(',').map(|x| length(x.trim()).ok()).collect();
+    match numbers.as_deref() {
+        Some(&[both]) => Ok(Vec2::splat(both)),
+        Some(&[x, y]) => Ok(Vec2::new(x, y)),
+        _ => Err(expected.into()),
+    }
+}
+
+/// Azimuth, and perhaps elevation.
+pub fn orbit(text: &str) -> Result<[f32; 2], String> {
+    let degrees = |x: &str| finite(x.trim()).ok().filter(|x| x.abs() <= 360.0);
+    let numbers: Option<Vec<f32>> = text.split(',').map(degrees).collect();
+    match numbers.as_deref() {
+        Some(&[azimuth]) => Ok([azimuth, 0.0]),
+        Some(&[azimuth, elevation]) => Ok([azimuth, elevation]),
+        _ => Err("expected degrees from -360 to 360: AZIMUTH or AZIMUTH,ELEVATION".into()),
+    }
+}
+
 /// A march step in texels.
 pub fn texels(text: &str) -> Result<f32, String> {
     let number = finite(text).ok().filter(|x| STEP_TEXELS.contains(x));
@@ -230,6 +274,12 @@ mod tests {
         for bad in ["0", "nan", "inf", "1e50", "one", ""] {
             assert!(scale(bad).is_err(), "{bad}");
         }
+        assert_eq!(repeats("2"), Ok(Vec2::splat(2.0)));
+        assert_eq!(repeats("2, 0.5"), Ok(Vec2::new(2.0, 0.5)));
+        assert!(repeats("0").is_err() && repeats("1,2,3").is_err() && repeats("").is_err());
+        assert_eq!(orbit("-30"), Ok([-30.0, 0.0]));
+        assert_eq!(orbit("90,15"), Ok([90.0, 15.0]));
+        assert!(orbit("361").is_err() && orbit("1,").is_err() && orbit("nan").is_err());
         assert_eq!(texels("0.25"), Ok(0.25));
         assert!(texels("0").is_err() && texels("-1").is_err() && texels("1e-9").is_err());
         assert_eq!(length("1e-3"), Ok(1e-3));

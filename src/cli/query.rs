@@ -14,12 +14,13 @@ use super::load::LoadArgs;
 use super::march::MarchArgs;
 use super::parse;
 use super::rays::{Layout, RayError, RayReader, Row};
+use super::surface::{TexcoordKind, WrapKind};
 use crate::files::{Outputs, output};
 use crate::image::Channel;
 use crate::prism::PrismOptions;
 use crate::ray::Cone;
 use crate::scene::{Loaded, MeshAndMap, ObjectShape, Scene};
-use crate::surface::{DisplacedSurface, Displacement, Projection, Seams, UvTransform, Wrap};
+use crate::surface::{DisplacedSurface, Displacement, Seams, UvTransform};
 use crate::trace::{RayReach, World};
 
 /// Trace rays from a CSV table and write their hits
@@ -90,39 +91,6 @@ struct SurfaceArgs {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum TexcoordKind {
-    /// The mesh file
-    File,
-    /// Six sides around the mesh, each face takes the nearest
-    Box,
-    /// Longitude and latitude around the middle of the mesh
-    Spherical,
-    /// Longitude around the vertical axis, and height
-    Cylindrical,
-    /// Along the mesh's shortest side
-    Planar,
-}
-
-impl TexcoordKind {
-    fn projection(self) -> Option<Projection> {
-        match self {
-            Self::File => None,
-            Self::Box => Some(Projection::Box),
-            Self::Spherical => Some(Projection::Spherical),
-            Self::Cylindrical => Some(Projection::Cylindrical),
-            Self::Planar => Some(Projection::Planar),
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum WrapKind {
-    Repeat,
-    Clamp,
-    Mirror,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum SeamKind {
     /// Displaced sheets part
     Open,
@@ -135,16 +103,6 @@ impl From<SeamKind> for Seams {
         match kind {
             SeamKind::Open => Self::Open,
             SeamKind::Closed => Self::Closed,
-        }
-    }
-}
-
-impl From<WrapKind> for Wrap {
-    fn from(kind: WrapKind) -> Self {
-        match kind {
-            WrapKind::Repeat => Self::Repeat,
-            WrapKind::Clamp => Self::Clamp,
-            WrapKind::Mirror => Self::Mirror,
         }
     }
 }

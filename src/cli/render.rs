@@ -1,4 +1,6 @@
-//! `prismarch render`: a scene file becomes a picture.
+//! `prismarch render`: a scene file, or a mesh and its maps, becomes a picture.
+
+mod mesh;
 
 use std::io::Write;
 use std::net::TcpStream;
@@ -10,6 +12,7 @@ use clap::builder::PossibleValuesParser;
 use super::engine::{Engine, EngineArgs};
 use super::error::CliError;
 use super::film::FilmArgs;
+use super::heading::{INPUT, MACHINE, PARTS, PICTURE, QUALITY};
 use super::interrupt::Interrupt;
 use super::load::LoadArgs;
 use super::march::MarchArgs;
@@ -21,18 +24,23 @@ use super::watch::{WatchArgs, Watched};
 use crate::files::Outputs;
 use crate::render::film::{Frame, FrameFile, FrameInfo, Objects, Source};
 use crate::render::{Outcome, RenderInput};
-use crate::scene::load::LoadOptions;
 use crate::scene::{Aov, AovSet, Film, Integrator, Loaded, Scene, View};
 use crate::trace::World;
+pub use mesh::Given;
+use mesh::MeshArgs;
 
-/// Render a scene file to a picture
+/// Render a mesh and its maps, or a scene file, to a picture
 ///
-/// The format of scene files is described in docs/scene.md. The picture is a PNG (tone curve, 8-bit sRGB) or an EXR (linear
+/// A mesh is framed by a camera and lit by sun and sky; --save writes the scene file that it stands for, to go on from. The format of scene files is described in docs/scene.md. The picture is a PNG (tone curve, 8-bit sRGB) or an EXR (linear
 /// radiance, 32-bit float, and what --aovs names), by the ending of its name; docs/render.md describes both. It is the same to the bit
 /// for any number of threads. Ctrl-C and SIGTERM write what is done and end with 128 + the signal's number.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
+  prismarch render rock.obj --displacement rock_height.png
+  prismarch render rock.obj --displacement rock_height.png --scale 0.2 --color rock_color.png --normals smooth -o rock.png
+  prismarch render rock.glb --displacement textures/ --view front --orbit 30 --floor
+  prismarch render rock.obj --displacement rock_height.png --save scene.toml
   prismarch render scene.toml
   prismarch render scene.toml -o rock.exr --size 1920x1080 --spp 256
   prismarch render scene.toml -o left.exr --crop 0,0,320,480
@@ -44,47 +52,52 @@ Examples:
   prismarch render scene.toml --lod cone --spp 1
   prismarch render scene.toml --backend bvh --threads 4 --stats stats.json --quiet")]
 pub struct Args {
-    /// Scene file (TOML)
+    /// Scene file (TOML), or a mesh: .obj, .gltf, .glb or .ply
+    #[arg(value_name = "SCENE|MESH")]
     scene: PathBuf,
-    /// Picture, .png or .exr [default: the scene's name with .png, in the current folder, or .render.png where the scene
-    /// reads that file]
-    #[arg(short, long, value_name = "FILE")]
+    #[command(flatten)]
+    mesh: MeshArgs,
+    /// Picture, .png or .exr [default: the scene's or the mesh's name with .png, in the current folder, or .render.png where the
+    /// run reads that file]
+    #[arg(short, long, value_name = "FILE", help_heading = PICTURE)]
     output: Option<PathBuf>,
     #[command(flatten)]
     film: FilmArgs,
     /// A key of the scene file with another value, like film.spp=64, light.0.strength=2 or material.rock.roughness=0.2; may be
     /// given again
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", help_heading = INPUT)]
     set: Vec<String>,
     /// What is computed, instead of the scene's integrator
-    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Integrator::names()))]
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Integrator::names()), help_heading = QUALITY)]
     integrator: Option<String>,
     /// Samples A to B - 1 of those of every pixel, to be merged with others [default: all]
-    #[arg(long, value_name = "A..B", value_parser = parse::samples)]
+    #[arg(long, value_name = "A..B", value_parser = parse::samples, help_heading = PARTS)]
     samples: Option<Range<u32>>,
     /// Go on with the output if it is there: an EXR file of the same scene and options that was interrupted
-    #[arg(long)]
+    #[arg(long, help_heading = PARTS)]
     resume: bool,
     #[command(flatten)]
     march: MarchArgs,
     #[command(flatten)]
     watch: WatchArgs,
     /// Write times, ray counts and memory as JSON
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = MACHINE)]
     stats: Option<PathBuf>,
     #[command(flatten)]
     load: LoadArgs,
     #[command(flatten)]
     engine: EngineArgs,
     /// Print errors and warnings only
-    #[arg(short, long)]
+    #[arg(short, long, help_heading = MACHINE)]
     quiet: bool,
 }
 
 /// Everything that a run of the renderer needs.
 pub struct Job<'a> {
-    /// Scene file.
+    /// Scene file, or mesh.
     pub scene: &'a Path,
+    /// Loads it.
+    pub load: &'a (dyn Fn() -> Result<Loaded, CliError> + Sync),
     /// Where the picture goes.
     pub target: Target,
     /// The user named it; else another name is taken where the scene reads that file.
@@ -93,10 +106,6 @@ pub struct Job<'a> {
     pub outputs: Outputs,
     /// Film settings that win over the scene's.
     pub film: &'a FilmArgs,
-    /// Values that win over the scene's, and lose to other options.
-    pub set: &'a [String],
-    /// What mesh files may do.
-    pub load: LoadOptions,
     /// The name of an integrator that wins over the scene's.
     pub integrator: Option<&'a str>,
     /// Which samples; `None` for all.
@@ -122,20 +131,38 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(stats) = &args.stats {
         outputs.add(stats)?;
     }
+    let lookdev = args.mesh.lookdev(&args.scene, args.quiet)?;
+    if let Some(save) = &args.mesh.save {
+        outputs.add(save)?;
+        outputs.spare([&args.scene])?;
+    }
+    if let (Some(lookdev), Some(save), None) = (&lookdev, &args.mesh.save, &args.output) {
+        args.engine.start_threads()?;
+        let loaded = args.make(lookdev, &outputs)?;
+        super::warn(&loaded.warnings);
+        return writeln!(std::io::stdout(), "{}", save.display()).map_err(CliError::stdout);
+    }
     let target = match &args.output {
         Some(path) => Target::new(path, &mut outputs)?,
         None => Target::of_scene(&args.scene, &outputs, &[])?,
     };
     outputs.spare([&args.scene])?;
     args.engine.start_threads()?;
+    let kept = outputs.clone();
     Job {
         scene: &args.scene,
+        load: &|| match &lookdev {
+            Some(lookdev) => args.make(lookdev, &kept),
+            None => Ok(Loaded::from_file_with(
+                &args.scene,
+                &args.set,
+                args.load.options(),
+            )?),
+        },
         target,
         is_named: args.output.is_some(),
         outputs,
         film: &args.film,
-        set: &args.set,
-        load: args.load.options(),
         integrator: args.integrator.as_deref(),
         samples: args.samples.clone(),
         resume: args.resume,
@@ -148,23 +175,33 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     .run()
 }
 
+/// Lets options win over the scene.
+fn settle(
+    scene: &mut Scene,
+    film: &FilmArgs,
+    integrator: Option<&str>,
+    march: &MarchArgs,
+) -> Result<(), CliError> {
+    film.apply(&mut scene.film)?;
+    if let Some(integrator) = integrator.and_then(Integrator::named) {
+        scene.integrator = integrator;
+    }
+    march.apply(scene, false)
+}
+
 impl Job<'_> {
     /// Loads, builds, renders, writes, and says so in one line.
     pub fn run(mut self) -> Result<(), CliError> {
         let mut clock = Clock::start();
         let viewer = self.watch.connect()?;
-        let mut loaded = Loaded::from_file_with(self.scene, self.set, self.load)?;
+        let mut loaded = (self.load)()?;
         self.spare(&loaded.files)?;
         super::warn(&loaded.warnings);
         if !self.quiet {
             super::note(&loaded.notes);
         }
-        self.film.apply(&mut loaded.scene.film)?;
+        settle(&mut loaded.scene, self.film, self.integrator, self.march)?;
         loaded.scene.film.progressive |= self.watch.preview.is_some();
-        if let Some(integrator) = self.integrator.and_then(Integrator::named) {
-            loaded.scene.integrator = integrator;
-        }
-        self.march.apply(&mut loaded.scene, false)?;
         let Some(mut begun) = self.begin(&mut loaded.scene)? else {
             return self.say(&format!("{} is complete", self.target.path().display()));
         };

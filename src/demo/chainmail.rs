@@ -299,7 +299,9 @@ midlevel = {midlevel}
 wrap = "clamp"
 
 [[mesh]]
-file = "floor.obj"
+name = "floor"
+shape = "plane"
+transform = {{ scale = 50 }}
 material = "floor"
 
 [[material]]

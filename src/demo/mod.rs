@@ -39,8 +39,7 @@ pub struct DemoFiles {
     pub color_size: usize,
     /// What else is displaced in the scene.
     pub parts: Vec<Part>,
-    /// The scene file (docs/scene.md). It names `NAME.obj`, `NAME_height.png` and `NAME_color.png`, and may
-    /// name a floor written as `floor.obj`.
+    /// The scene file (docs/scene.md). It names `NAME.obj`, `NAME_height.png` and `NAME_color.png`.
     pub scene: String,
 }
 

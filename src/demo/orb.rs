@@ -399,7 +399,9 @@ scale = {scale}
 midlevel = {midlevel}
 
 [[mesh]]
-file = "floor.obj"
+name = "floor"
+shape = "plane"
+transform = {{ scale = 50 }}
 material = "floor"
 
 [[material]]

@@ -455,7 +455,9 @@ spp = 16
 exposure = 0.6
 
 [[mesh]]
-file = "floor.obj"
+name = "floor"
+shape = "plane"
+transform = { scale = 50 }
 material = "earth"
 
 [[material]]

@@ -51,7 +51,9 @@ target = [0.15, 0.5, 0.0]
 fov = 26.0
 
 {FILM}[[mesh]]
-file = "floor.obj"
+name = "floor"
+shape = "plane"
+transform = {{ scale = 50 }}
 material = "earth"
 
 [[mesh]]

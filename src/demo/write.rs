@@ -1,4 +1,4 @@
-//! A demo's files: base meshes, floor, maps and scene, ready to be rendered and edited.
+//! A demo's files: base meshes, maps and scene, ready to be rendered and edited.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -10,9 +10,6 @@ use super::{Demo, DemoFiles};
 use crate::files::output::{self, OutputError, Staged};
 use crate::image::{stage_png_gray16, stage_png_rgb8};
 use crate::surface::MeshBuilder;
-
-/// Half the side of the floor, a square at y = 0 around the origin.
-const FLOOR: f32 = 50.0;
 
 /// Why a demo could not be written.
 #[derive(Debug, Error)]
@@ -134,9 +131,6 @@ impl Demo {
             stage.mesh(part.name, &part.mesh)?;
             stage.map(part.name, part.map_size, &part.heights)?;
         }
-        if files.scene.contains("floor.obj") {
-            stage.mesh("floor", &floor())?;
-        }
         stage.add(format!("{}.toml", self.name), |path| {
             output::stage(path, |out| out.write_all(files.scene.as_bytes()))
         })?;
@@ -183,21 +177,6 @@ impl Stage<'_> {
         self.add(format!("{name}_height.png"), |path| {
             stage_png_gray16(path, size, size, heights)
         })
-    }
-}
-
-/// A square that faces up.
-fn floor() -> MeshBuilder {
-    let corners = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
-    MeshBuilder {
-        positions: corners
-            .map(|(x, z)| glam::Vec3::new(FLOOR * x, 0.0, FLOOR * z))
-            .to_vec(),
-        normals: vec![glam::Vec3::Y; 4],
-        texcoords: corners
-            .map(|(x, z)| glam::Vec2::new(0.5 + 0.5 * x, 0.5 - 0.5 * z))
-            .to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
     }
 }
 

@@ -26,7 +26,8 @@ use crate::surface::{
     BaseMesh, DisplacedSurface, Displacement, DisplacementMap, Joined, MeshBuilder, NormalMode,
     Projection, Seams, SurfaceError, Wrap,
 };
-use assets::Assets;
+pub(super) use assets::Assets;
+pub(super) use frame::reach;
 
 /// A displacement map and the file it is from, for reports.
 #[derive(Clone, Debug)]
@@ -52,6 +53,8 @@ pub struct Loaded {
     pub files: Vec<PathBuf>,
     /// Where the file says what places the camera, if it does.
     eye: Option<Keyed<()>>,
+    /// The material of meshes that nothing is said of, if there are such.
+    pub(super) default_material: Option<usize>,
 }
 
 /// One mesh under one map, as named on a command line.
@@ -92,7 +95,22 @@ impl Loaded {
         options: LoadOptions,
     ) -> Result<Self, SceneError> {
         let file = SceneFile::read(path, overrides)?;
-        let mut builder = Builder::default();
+        let (mut loaded, _) = Self::from_scene_file(path, file, options, Assets::default())?;
+        loaded.files.push(path.to_owned());
+        Ok(loaded)
+    }
+
+    /// Loads what the scene `file` at `path` names, but for pictures that are among `assets`: these and what has been loaded come back.
+    pub(super) fn from_scene_file(
+        path: &Path,
+        file: SceneFile,
+        options: LoadOptions,
+        assets: Assets,
+    ) -> Result<(Self, Assets), SceneError> {
+        let mut builder = Builder {
+            assets,
+            ..Builder::default()
+        };
         for material in &file.materials {
             let material = builder.material(material)?;
             builder.materials.push(material);
@@ -109,9 +127,9 @@ impl Loaded {
         };
         lights.append(&mut builder.file_lights);
         let (camera, eye) = builder.camera(&file.camera)?;
-        builder.files.push(path.to_owned());
+        let assets = builder.assets.clone();
         let loaded = builder.finish(path, camera, file.film, lights, file.integrator);
-        Ok(Self { eye, ..loaded })
+        Ok((Self { eye, ..loaded }, assets))
     }
 
     /// The error that the camera is inside of this object; `None` where the file does not place the camera, since
@@ -234,7 +252,10 @@ impl Builder {
             crease_angle: table.crease_angle,
             join: table.join,
         };
-        let mut loaded = load_mesh_with(path, options).map_err(|e| asset(e.into()))?;
+        let mut loaded = match table.shape {
+            Some(shape) => shape.load(),
+            None => load_mesh_with(path, options).map_err(|e| asset(e.into()))?,
+        };
         let refused = |kind| {
             let path = path.clone();
             asset(LoadMeshError { path, kind }.into())
@@ -460,6 +481,7 @@ impl Builder {
             warnings: self.warnings,
             notes: self.notes,
             eye: None,
+            default_material: self.default_material,
             scene: Scene {
                 path: path.to_owned(),
                 camera,
@@ -521,7 +543,7 @@ fn placements(scene: &[Affine3A], file: &[Affine3A], transform: &Affine3A) -> Ve
     scene.iter().flat_map(placed).collect()
 }
 
-fn displaced(
+pub(super) fn displaced(
     part: &str,
     mesh: Arc<BaseMesh>,
     (path, map): (&Path, &Arc<DisplacementMap>),
@@ -549,7 +571,7 @@ fn default_seams(material: &Material, march: March) -> Seams {
     }
 }
 
-fn stem(path: &Path) -> String {
+pub(super) fn stem(path: &Path) -> String {
     path.file_stem()
         .map_or_else(|| "mesh".into(), |s| s.to_string_lossy().into_owned())
 }

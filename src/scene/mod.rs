@@ -11,6 +11,7 @@ mod fingerprint;
 mod integrator;
 mod light;
 pub mod load;
+pub mod lookdev;
 mod material;
 mod world;
 

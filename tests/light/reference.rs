@@ -63,7 +63,11 @@ impl Facets {
         let mut triangles = Vec::new();
         for prim in 0..surface.mesh().triangles().len() as u32 {
             let patch = surface.patch(prim);
-            let at = |i: usize, j: usize| patch.point(i as f64 / n as f64, j as f64 / n as f64).position;
+            let at = |i: usize, j: usize| {
+                patch
+                    .point(i as f64 / n as f64, j as f64 / n as f64)
+                    .position
+            };
             for j in 0..n {
                 for i in 0..n - j {
                     triangles.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
@@ -86,7 +90,10 @@ impl Facets {
         while let Some(k) = stack.pop() {
             let node = &self.nodes[k];
             let limit = met.map_or(most, |(t, _)| t);
-            let (a, b) = ((node.low - origin) * inverse, (node.high - origin) * inverse);
+            let (a, b) = (
+                (node.low - origin) * inverse,
+                (node.high - origin) * inverse,
+            );
             let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
             if near > far || far < 0.0 || near > limit {
                 continue;
@@ -161,7 +168,11 @@ impl Facets {
                 }
             };
             throughput *= weight;
-            let stays = if bounce < 4 { 1.0 } else { throughput.min(0.95) };
+            let stays = if bounce < 4 {
+                1.0
+            } else {
+                throughput.min(0.95)
+            };
             if throughput <= 0.0 || numbers.number() >= stays {
                 break;
             }
@@ -206,7 +217,11 @@ impl Facets {
             return 0.0;
         }
         let hidden = self.meet(point + 1e-7 * normal, to, distance * (1.0 - 1e-9));
-        if hidden.is_some() { 0.0 } else { cos * strength }
+        if hidden.is_some() {
+            0.0
+        } else {
+            cos * strength
+        }
     }
 }
 
@@ -222,7 +237,10 @@ fn seen(lamp: Lamp, origin: DVec3, direction: DVec3, reach: f64) -> f64 {
             let normal = a.cross(b);
             let t = (corner - origin).dot(normal) / direction.dot(normal);
             let at = origin + t * direction - corner;
-            let (u, v) = (at.dot(a) / a.length_squared(), at.dot(b) / b.length_squared());
+            let (u, v) = (
+                at.dot(a) / a.length_squared(),
+                at.dot(b) / b.length_squared(),
+            );
             let inside = (0.0..1.0).contains(&u) && (0.0..1.0).contains(&v);
             let shines = t > 0.0 && t < reach && direction.dot(normal) < 0.0;
             if inside && shines { radiance } else { 0.0 }
@@ -237,7 +255,10 @@ fn metal(normal: DVec3, v: DVec3, alpha: f64, reflectance: f64, u: DVec2) -> (DV
     let cos2 = (1.0 - u.x) / (1.0 + (a2 - 1.0) * u.x);
     let sin = (1.0 - cos2).max(0.0).sqrt();
     let turn = TAU * u.y;
-    let half = around(normal, DVec3::new(sin * turn.cos(), sin * turn.sin(), cos2.sqrt()));
+    let half = around(
+        normal,
+        DVec3::new(sin * turn.cos(), sin * turn.sin(), cos2.sqrt()),
+    );
     let vh = v.dot(half);
     let l = 2.0 * vh * half - v;
     let (nl, nv, nh) = (normal.dot(l), normal.dot(v), normal.dot(half));
@@ -299,7 +320,12 @@ fn build(triangles: &mut [[DVec3; 3]], from: usize, to: usize, nodes: &mut Vec<N
         (low, high) = (low.min(*p), high.max(*p));
     }
     let index = nodes.len();
-    nodes.push(Node { low, high, from, to });
+    nodes.push(Node {
+        low,
+        high,
+        from,
+        to,
+    });
     if own.len() <= LEAF {
         return;
     }

@@ -8,7 +8,8 @@ use prismarch::prism::{March, Prisms};
 use prismarch::render::film::{Frame, Objects};
 use prismarch::render::{Control, RenderInput, render_frame};
 use prismarch::scene::{
-    AovSet, Camera, Color, Film, Filter, FilterShape, Integrator, Light, Material, PathLimits, Scalar,
+    AovSet, Camera, Color, Film, Filter, FilterShape, Integrator, Light, Material, PathLimits,
+    Scalar,
 };
 use prismarch::surface::{
     DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, ShadingNormals,
@@ -59,9 +60,15 @@ fn soft(n: usize) -> Vec<u16> {
 
 /// The same, level at the bottom and the top: for spheres, whose poles are drawn together there.
 fn soft_belt(n: usize) -> Vec<u16> {
-    let window = |i: usize| (std::f32::consts::PI * ((i / n) as f32 + 0.5) / n as f32).sin().powi(2);
+    let window = |i: usize| {
+        (std::f32::consts::PI * ((i / n) as f32 + 0.5) / n as f32)
+            .sin()
+            .powi(2)
+    };
     let waves = soft(n).into_iter().enumerate();
-    waves.map(|(i, h)| (f32::from(h) * window(i)) as u16).collect()
+    waves
+        .map(|(i, h)| (f32::from(h) * window(i)) as u16)
+        .collect()
 }
 
 /// The same surface as `texels` of `n` x `n` in `times` as many texels, which repeat.
@@ -144,11 +151,27 @@ pub fn cases() -> Vec<Case> {
     let upsampled = || upsampled(&noise(64), 64, 16);
     vec![
         above("flat, noise", surface(plane(), 64, noise(64), 0.05), 256),
-        above("flat, noise in 16x16 texels", surface(plane(), 1024, upsampled(), 0.05), 256),
+        above(
+            "flat, noise in 16x16 texels",
+            surface(plane(), 1024, upsampled(), 0.05),
+            256,
+        ),
         above("flat, soft", surface(plane(), 128, soft(128), 0.2), 256),
-        around("curved, noise", surface(sphere(32, 16), 64, noise(64), 0.1), 16),
-        around("curved, soft", surface(sphere(32, 16), 128, soft_belt(128), 0.2), 16),
-        around("coarse, soft", surface(sphere(10, 5), 128, soft_belt(128), 0.2), 50),
+        around(
+            "curved, noise",
+            surface(sphere(32, 16), 64, noise(64), 0.1),
+            16,
+        ),
+        around(
+            "curved, soft",
+            surface(sphere(32, 16), 128, soft_belt(128), 0.2),
+            16,
+        ),
+        around(
+            "coarse, soft",
+            surface(sphere(10, 5), 128, soft_belt(128), 0.2),
+            50,
+        ),
     ]
 }
 
@@ -219,7 +242,9 @@ fn lamp_mesh(lamp: Lamp) -> Option<(Shape, Material)> {
         return None;
     };
     let mesh = MeshBuilder {
-        positions: [corner, corner + a, corner + a + b, corner + b].map(|p| p.as_vec3()).to_vec(),
+        positions: [corner, corner + a, corner + a + b, corner + b]
+            .map(|p| p.as_vec3())
+            .to_vec(),
         normals: vec![],
         texcoords: vec![],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
@@ -243,8 +268,21 @@ pub struct Look {
 
 /// The mean radiance of a case's picture over what is hit, by normals of a kind.
 pub fn mean(case: &Case, look: &Look, normals: ShadingNormals) -> f64 {
-    let covered = 1.0 - picture(case, &Look { matter: Matter::Chalk(0.0), lamp: Lamp::Sky, ..*look }, normals);
-    let behind = if matches!(look.lamp, Lamp::Sky) { 1.0 - covered } else { 0.0 };
+    let covered = 1.0
+        - picture(
+            case,
+            &Look {
+                matter: Matter::Chalk(0.0),
+                lamp: Lamp::Sky,
+                ..*look
+            },
+            normals,
+        );
+    let behind = if matches!(look.lamp, Lamp::Sky) {
+        1.0 - covered
+    } else {
+        0.0
+    };
     (picture(case, look, normals) - behind) / covered
 }
 
@@ -254,7 +292,9 @@ fn picture(case: &Case, look: &Look, normals: ShadingNormals) -> f64 {
     let prisms = Prisms::new(Arc::new(surface), March::Exact).unwrap();
     let mut shapes = vec![(Shape::Displaced(Arc::new(prisms)), material(look.matter))];
     let mut lights = light(look.lamp);
-    if look.is_mesh && let Some(mesh) = lamp_mesh(look.lamp) {
+    if look.is_mesh
+        && let Some(mesh) = lamp_mesh(look.lamp)
+    {
         shapes.push(mesh);
         lights.clear();
     }
@@ -276,7 +316,10 @@ fn picture(case: &Case, look: &Look, normals: ShadingNormals) -> f64 {
         width: SIDE,
         height: SIDE,
         spp: look.spp,
-        filter: Filter { shape: FilterShape::Box, radius: 0.5 },
+        filter: Filter {
+            shape: FilterShape::Box,
+            radius: 0.5,
+        },
         aovs: AovSet::NONE,
         ..Film::default()
     };

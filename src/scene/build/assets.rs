@@ -16,7 +16,7 @@ use crate::surface::{DisplacementMap, Wrap};
 
 /// A picture that a scene or a mesh file names.
 #[derive(Clone, Copy)]
-pub(super) enum Picture<'a> {
+pub(in crate::scene) enum Picture<'a> {
     File(&'a Path),
     /// Inside of the mesh file `mesh`.
     Embedded {
@@ -36,8 +36,8 @@ type ChannelKey = (PictureKey, Channel, [Wrap; 2]);
 type HeightsKey = (PathBuf, Channel, Wrap, Option<f32>);
 
 /// What has been loaded so far.
-#[derive(Default)]
-pub(super) struct Assets {
+#[derive(Clone, Default)]
+pub(in crate::scene) struct Assets {
     heights: Vec<(HeightsKey, Arc<DisplacementMap>)>,
     scalars: Vec<(ChannelKey, Arc<ScalarImage>)>,
     colors: Vec<((PictureKey, ColorSpace, Vec3), Arc<ColorImage>)>,

@@ -7,6 +7,7 @@ use crate::scene::error::SceneError;
 use crate::scene::file::{CameraTable, LensTable, ProjectionTable};
 use crate::scene::load::{FileCamera, FileProjection};
 use crate::scene::{Camera, Lens, ObjectShape, Projection, SceneObject};
+use crate::surface::DisplacedSurface;
 
 /// From the middle of the scene to the eye: half from the right, a little from above.
 const THREE_QUARTER: Vec3 = Vec3::new(0.55, 0.45, 1.0);
@@ -14,38 +15,31 @@ const THREE_QUARTER: Vec3 = Vec3::new(0.55, 0.45, 1.0);
 /// The box over all objects where they stand, grown by how far they are displaced.
 pub(super) fn bounds(objects: &[SceneObject]) -> Aabb {
     let object = |object: &SceneObject| {
-        let (mesh, reach) = match &object.shape {
-            ObjectShape::Displaced(surface, _) => {
-                let (low, high) = surface.range();
-                (surface.mesh(), low.abs().max(high.abs()))
-            }
-            ObjectShape::Plain(mesh) => (mesh, 0.0),
-        };
-        let Aabb { min, max } = mesh.bounds();
-        let own = Aabb {
-            min: min - reach,
-            max: max + reach,
+        let own = match &object.shape {
+            ObjectShape::Displaced(surface, _) => reach(surface),
+            ObjectShape::Plain(mesh) => mesh.bounds(),
         };
         if object.instances.is_empty() {
             return own;
         }
         let placed = object.instances.iter().flat_map(|transform| {
-            corners(own).map(|p| Vec3::from(transform.transform_point3a(Vec3A::from(p))))
+            own.corners()
+                .map(|p| Vec3::from(transform.transform_point3a(Vec3A::from(p))))
         });
         placed.fold(Aabb::EMPTY, Aabb::including)
     };
     objects.iter().map(object).fold(Aabb::EMPTY, Aabb::union)
 }
 
-fn corners(Aabb { min, max }: Aabb) -> [Vec3; 8] {
-    std::array::from_fn(|i| {
-        let pick = |bit: usize, low: f32, high: f32| if i & bit == 0 { low } else { high };
-        Vec3::new(
-            pick(1, min.x, max.x),
-            pick(2, min.y, max.y),
-            pick(4, min.z, max.z),
-        )
-    })
+/// The box around a mesh, as far as it could be displaced in any direction.
+pub(in crate::scene) fn reach(surface: &DisplacedSurface) -> Aabb {
+    let (low, high) = surface.range();
+    let reach = low.abs().max(high.abs());
+    let Aabb { min, max } = surface.mesh().bounds();
+    Aabb {
+        min: min - reach,
+        max: max + reach,
+    }
 }
 
 /// The camera of a file, framed where it says nothing.

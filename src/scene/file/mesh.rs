@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use glam::{Affine3A, EulerRot, Mat3, Quat, Vec3};
 
 use super::{
-    Item, Keyed, STEP_TEXELS, SceneError, channel, factor, file_path, keyed, uv_transform, wrap,
+    Item, Keyed, STEP_TEXELS, SceneError, Section, channel, factor, file_path, keyed, uv_transform,
+    wrap,
 };
 use crate::image::Channel;
 use crate::prism::{EditBounds, Lod, March, PrismOptions, Step};
+use crate::scene::load::Shape;
 use crate::surface::{Projection, Seams, ShadingNormals, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
@@ -16,7 +18,7 @@ pub(in crate::scene) const SCALE: &str =
     "world units from height 0 to height 1: a number other than 0";
 
 /// The words for where texture coordinates come from.
-const TEXCOORDS: [(&str, Option<Projection>); 5] = [
+pub(in crate::scene) const TEXCOORDS: [(&str, Option<Projection>); 5] = [
     ("file", None),
     ("box", Some(Projection::Box)),
     ("spherical", Some(Projection::Spherical)),
@@ -41,7 +43,10 @@ const UNITS: [(&str, f32); 5] = [
 pub(in crate::scene) struct MeshTable {
     /// Default: the file's stem.
     pub name: Option<String>,
+    /// Of a built-in shape its word, which names it in messages as a path does a file.
     pub file: Keyed<PathBuf>,
+    /// Instead of a file.
+    pub shape: Option<Shape>,
     /// From the file's space, which has its own up and unit, to one with +Y up and world units.
     pub stand: Affine3A,
     /// Whether the file's lights shine.
@@ -88,6 +93,7 @@ impl MeshTable {
         let mut section = item.section(&[
             "name",
             "file",
+            "shape",
             "up",
             "unit",
             "lights",
@@ -102,11 +108,12 @@ impl MeshTable {
             "instances",
             "displacement",
         ])?;
-        let file = section.require("file", "the path of a mesh file")?;
+        let (file, shape) = source(&mut section, folder)?;
         let modes = [("file", false), ("smooth", true)];
         Ok(Self {
             name: section.optional("name", |i| Ok(i.text("a name, in quotes")?.to_owned()))?,
-            file: file_path(&file, folder)?,
+            file,
+            shape,
             stand: stand(&mut section)?,
             lights: section
                 .optional("lights", |i| i.word(&[("file", true), ("ignore", false)]))?
@@ -142,6 +149,23 @@ impl MeshTable {
                 .optional("displacement", |i| DisplacementTable::read(i, folder))?,
         })
     }
+}
+
+/// `file`, or `shape` in its place.
+fn source(
+    section: &mut Section,
+    folder: &Path,
+) -> Result<(Keyed<PathBuf>, Option<Shape>), SceneError> {
+    let Some(item) = section.get("shape") else {
+        let file = section.require("file", "the path of a mesh file, or shape = \"plane\"")?;
+        return Ok((file_path(&file, folder)?, None));
+    };
+    if section.get("file").is_some() {
+        return Err(item.error("a file and a shape", "only one of them"));
+    }
+    let word = item.text("the name of a shape, like \"plane\"")?;
+    let named = keyed(&item, PathBuf::from(word));
+    Ok((named, Some(item.word(&Shape::NAMES)?)))
 }
 
 impl DisplacementTable {
@@ -199,7 +223,7 @@ fn one_wrap(item: Item) -> Result<Wrap, SceneError> {
     wrap(item)
 }
 
-fn seams(section: &mut super::Section, march: March) -> Result<Option<Seams>, SceneError> {
+fn seams(section: &mut Section, march: March) -> Result<Option<Seams>, SceneError> {
     let Some(item) = section.get("seams") else {
         return Ok(None);
     };
@@ -214,7 +238,7 @@ fn seams(section: &mut super::Section, march: March) -> Result<Option<Seams>, Sc
     Ok(Some(seams))
 }
 
-fn lod(section: &mut super::Section, march: March) -> Result<Lod, SceneError> {
+fn lod(section: &mut Section, march: March) -> Result<Lod, SceneError> {
     let Some(item) = section.get("lod") else {
         return Ok(Lod::Off);
     };
@@ -230,7 +254,7 @@ fn lod(section: &mut super::Section, march: March) -> Result<Lod, SceneError> {
 }
 
 /// `march`, and what belongs to the uniform one: a step or its jitter choose it where no march is named.
-fn march(section: &mut super::Section) -> Result<March, SceneError> {
+fn march(section: &mut Section) -> Result<March, SceneError> {
     let words = [("exact", false), ("uniform", true)];
     let uniform = section.optional("march", |i| i.word(&words))?;
     if uniform == Some(false) {
@@ -253,7 +277,7 @@ fn march(section: &mut super::Section) -> Result<March, SceneError> {
 }
 
 /// `dt` or `dt_world`.
-fn step(section: &mut super::Section) -> Result<Option<Step>, SceneError> {
+fn step(section: &mut Section) -> Result<Option<Step>, SceneError> {
     let texels = section.optional("dt", |i| {
         let (low, high) = (STEP_TEXELS.start(), STEP_TEXELS.end());
         let expected = format!("texels per step, from {low} to {high}");

@@ -16,6 +16,7 @@ mod obj;
 mod placing;
 mod ply;
 mod polygon;
+mod shape;
 mod text;
 mod unused;
 
@@ -34,6 +35,7 @@ pub use material::{
     FileColor, FileDetail, FileDisplacement, FileMaterial, FileScalar, FileTexture, FileTextureUse,
 };
 pub use placing::Broken;
+pub(super) use shape::Shape;
 pub use unused::Unused;
 pub(super) use unused::counted;
 
