@@ -167,3 +167,6 @@ fn angle(texels: [DVec2; 3], k: usize) -> f64 {
     let [a, b] = [1, 2].map(|next| texels[(k + next) % 3] - texels[k]);
     a.perp_dot(b).abs().atan2(a.dot(b))
 }
+
+#[cfg(test)]
+mod tests;

@@ -158,8 +158,7 @@ impl Facets {
                     (around(normal, cosine(numbers.point())), albedo, true)
                 }
                 Matter::Metal { alpha, reflectance } => {
-                    let (next, weight) =
-                        metal(normal, -direction, alpha, reflectance, numbers.point());
+                    let (next, weight) = metal(normal, -direction, alpha, reflectance, numbers);
                     (next, weight, false)
                 }
                 Matter::Glass { index } => {
@@ -249,26 +248,46 @@ fn seen(lamp: Lamp, origin: DVec3, direction: DVec3, reach: f64) -> f64 {
     }
 }
 
-/// Walter et al. 2007, equations 33 to 41: a microfacet, its mirror direction, and the weight of that.
-fn metal(normal: DVec3, v: DVec3, alpha: f64, reflectance: f64, u: DVec2) -> (DVec3, f64) {
-    let a2 = alpha * alpha;
-    let cos2 = (1.0 - u.x) / (1.0 + (a2 - 1.0) * u.x);
-    let sin = (1.0 - cos2).max(0.0).sqrt();
-    let turn = TAU * u.y;
-    let half = around(
-        normal,
-        DVec3::new(sin * turn.cos(), sin * turn.sin(), cos2.sqrt()),
-    );
-    let vh = v.dot(half);
-    let l = 2.0 * vh * half - v;
-    let (nl, nv, nh) = (normal.dot(l), normal.dot(v), normal.dot(half));
-    if nl <= 0.0 || vh <= 0.0 {
-        return (l, 0.0);
+/// Where light goes on from a rough metal, and its weight: a walk from facet to facet until it leaves, so that nothing is lost (Heitz et al., "Multiple-
+/// Scattering Microfacet BSDFs with the Smith Model", SIGGRAPH 2016, section 4), facets at uniform heights in -1 .. 1.
+fn metal(
+    normal: DVec3,
+    v: DVec3,
+    alpha: f64,
+    reflectance: f64,
+    numbers: &mut Numbers,
+) -> (DVec3, f64) {
+    let x = normal.any_orthonormal_vector();
+    let axes = [x, normal.cross(x), normal];
+    let mut way = -DVec3::from_array(axes.map(|axis| axis.dot(v)));
+    let mut weight = 1.0;
+    let mut below: f64 = 1.0; // part of the heights below
+    loop {
+        // Light that goes straight up or down meets every height, or none.
+        let tan2 = (1.0 - way.z * way.z) / (way.z * way.z);
+        let root = (1.0 + alpha * alpha * tan2).sqrt();
+        let lambda = 0.5 * (way.z.signum() * root - 1.0);
+        let u = numbers.number();
+        let free = below.powf(lambda);
+        if way.z > 0.0 && (u <= free || lambda < 1e-12) {
+            return (around(normal, way), weight);
+        }
+        below /= (1.0 - if way.z > 0.0 { u } else { u.min(1.0 - 1e-12) }).powf(1.0 / lambda);
+        below = below.clamp(1e-12, 1.0);
+        let half = facet(-way, alpha, numbers.point());
+        let cos = -way.dot(half);
+        weight *= reflectance + (1.0 - reflectance) * (1.0 - cos).clamp(0.0, 1.0).powi(5);
+        way = (way + 2.0 * cos * half).normalize();
     }
-    let lambda = |cos: f64| 0.5 * ((1.0 + a2 * (1.0 / (cos * cos) - 1.0)).sqrt() - 1.0);
-    let masking = 1.0 / (1.0 + lambda(nl) + lambda(nv));
-    let fresnel = reflectance + (1.0 - reflectance) * (1.0 - vh).powi(5);
-    (l, fresnel * masking * vh / (nv * nh))
+}
+
+/// A facet as it is seen from `v` (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023).
+fn facet(v: DVec3, alpha: f64, u: DVec2) -> DVec3 {
+    let stretched = DVec3::new(alpha * v.x, alpha * v.y, v.z).normalize();
+    let z = (1.0 - u.x) * (1.0 + stretched.z) - stretched.z;
+    let (sin, turn) = ((1.0 - z * z).max(0.0).sqrt(), TAU * u.y);
+    let half = DVec3::new(sin * turn.cos(), sin * turn.sin(), z) + stretched;
+    DVec3::new(alpha * half.x, alpha * half.y, half.z.max(0.0)).normalize()
 }
 
 /// Mirrored or bent by Fresnel's chance.

@@ -268,22 +268,23 @@ pub struct Look {
 
 /// The mean radiance of a case's picture over what is hit, by normals of a kind.
 pub fn mean(case: &Case, look: &Look, normals: ShadingNormals) -> f64 {
-    let covered = 1.0
-        - picture(
-            case,
-            &Look {
-                matter: Matter::Chalk(0.0),
-                lamp: Lamp::Sky,
-                ..*look
-            },
-            normals,
-        );
-    let behind = if matches!(look.lamp, Lamp::Sky) {
-        1.0 - covered
-    } else {
-        0.0
+    let black = Matter::Chalk(0.0);
+    let around = |lamp| {
+        let look = Look {
+            matter: black,
+            lamp,
+            ..*look
+        };
+        picture(case, &look, normals)
     };
-    (picture(case, look, normals) - behind) / covered
+    let sky = around(Lamp::Sky);
+    // Points and suns are not seen, and the lamps that are meshes hang outside of the picture.
+    let behind = match look.lamp {
+        Lamp::Sky => sky,
+        Lamp::Rectangle { .. } if !look.is_mesh => around(look.lamp),
+        _ => 0.0,
+    };
+    (picture(case, look, normals) - behind) / (1.0 - sky)
 }
 
 /// The mean radiance of a whole picture.
