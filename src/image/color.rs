@@ -68,8 +68,13 @@ impl ColorImage {
         let st = if st.is_finite() { st } else { Vec2::ZERO };
         let ([x0, x1], fx) = cell(st.x, self.width, across);
         let ([y0, y1], fy) = cell(st.y, self.height, up);
-        let bottom = self.pixel(x0, y0).lerp(self.pixel(x1, y0), fx);
-        let top = self.pixel(x0, y1).lerp(self.pixel(x1, y1), fx);
+        let (low, high) = (y0 * self.width, y1 * self.width);
+        let at = [low + x0, low + x1, high + x0, high + x1];
+        let corners = match &self.pixels {
+            ColorPixels::Srgb8(pixels) => at.map(|i| linear(pixels[i])),
+            ColorPixels::Linear(pixels) => at.map(|i| Vec3::from(pixels[i])),
+        };
+        let [bottom, top] = [0, 2].map(|i| corners[i].lerp(corners[i + 1], fx));
         bottom.lerp(top, fy)
     }
 
@@ -77,9 +82,7 @@ impl ColorImage {
     pub fn pixel(&self, x: usize, y: usize) -> Vec3 {
         let index = y * self.width + x;
         match &self.pixels {
-            ColorPixels::Srgb8(pixels) => pixels[index]
-                .map(|code| srgb::DECODE_8[usize::from(code)])
-                .into(),
+            ColorPixels::Srgb8(pixels) => linear(pixels[index]),
             ColorPixels::Linear(pixels) => pixels[index].into(),
         }
     }
@@ -93,13 +96,18 @@ impl ColorImage {
     }
 }
 
+fn linear(codes: [u8; 3]) -> Vec3 {
+    codes.map(|code| srgb::DECODE_8[usize::from(code)]).into()
+}
+
 /// The two pixels that `s` lies between along a side of `size` pixels, and how far it is from the first.
 fn cell(s: f32, size: usize, wrap: Wrap) -> ([usize; 2], f32) {
     let side = size as f64;
     let (x, _) = wrap.fold(f64::from(s) * side - 0.5, side);
     let first = (x as usize).min(size - 1);
     let second = match wrap {
-        Wrap::Repeat => (first + 1) % size,
+        Wrap::Repeat if first + 1 == size => 0,
+        Wrap::Repeat => first + 1,
         Wrap::Clamp | Wrap::Mirror => (first + 1).min(size - 1),
     };
     ([first, second], (x - first as f64) as f32)

@@ -65,6 +65,11 @@ impl Eye {
         }
     }
 
+    /// Whether rays start all over a lens, so that [`Self::ray`] makes use of its `u`.
+    pub fn has_lens(&self) -> bool {
+        self.lens.is_some()
+    }
+
     /// From the lens to where the pinhole's ray meets the plane that is sharp.
     fn through_lens(&self, lens: &Lens, pinhole: Vec3, u: Vec2) -> Ray {
         let at = lens.radius * aperture(lens, u);

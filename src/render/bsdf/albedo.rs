@@ -40,6 +40,24 @@ pub fn reflection(f0: f32, f90: f32, cos: f32, alpha: f32) -> f32 {
     f0 * normal + f90 * grazing
 }
 
+/// The mean of [`reflection`] over the hemisphere.
+pub fn reflection_mean(f0: f32, f90: f32, alpha: f32) -> f32 {
+    let (y, fy) = cell(alpha.sqrt(), SIDE);
+    let [normal, grazing] = Vec2::from(REFLECTION_MEANS[y])
+        .lerp(Vec2::from(REFLECTION_MEANS[y + 1]), fy)
+        .to_array();
+    f0 * normal + f90 * grazing
+}
+
+/// By roughness alone: what is linear in the table's rows has means that are.
+static REFLECTION_MEANS: LazyLock<Vec<[f32; 2]>> = LazyLock::new(|| {
+    let rows = (0..SIDE).map(|y| {
+        let alpha = (y as f32 / (SIDE - 1) as f32).powi(2);
+        [0, 1].map(|k| hemisphere_mean(|cos| REFLECTION.at(cos, alpha)[k]))
+    });
+    rows.collect()
+});
+
 /// What the sheen lobe of colour 1 returns.
 pub fn sheen(cos: f32, alpha: f32) -> f32 {
     SHEEN.at(cos, alpha)[0]
@@ -209,6 +227,15 @@ mod tests {
                 );
                 assert!(glass(cos, 1.0, eta) < 1.0);
             }
+        }
+    }
+
+    #[test]
+    fn means_by_the_table_are_those_by_the_rule() {
+        for alpha in [SMOOTHEST, 0.01, 0.2, 0.7, 1.0] {
+            let exact = hemisphere_mean(|cos| reflection(0.04, 1.0, cos, alpha));
+            let found = reflection_mean(0.04, 1.0, alpha);
+            assert!((found - exact).abs() < 1e-5, "{alpha}: {found} {exact}");
         }
     }
 

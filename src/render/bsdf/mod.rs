@@ -115,8 +115,8 @@ pub struct BsdfSample {
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf {
     p: Parameters,
-    /// The layers outside, for light that passes from there to a viewer inside.
-    outside: Parameters,
+    /// Coat and sheen outside, for light that passes from there to a viewer inside.
+    outside: (f32, Vec3),
     v: Vec3,
     /// The part of light from the viewer that reaches the base.
     through: f32,
@@ -135,17 +135,17 @@ pub struct Bsdf {
 impl Bsdf {
     /// The material `p` seen from `v`, which is above the surface.
     pub fn new(mut p: Parameters, v: Vec3) -> Self {
-        let outside = p;
+        let outside = (p.coat, p.sheen);
         if p.inside {
             (p.coat, p.sheen) = (0.0, Vec3::ZERO);
         }
         let through = p.through(v.z);
         let [dielectric, metal] = p.diffuse_albedos(v.z);
-        let over_mean = |albedo: Vec3, under: &dyn Fn(f32) -> f32| {
+        let over = |albedo: Vec3, mean: fn(&Parameters) -> f32| {
             if albedo == Vec3::ZERO {
                 albedo
             } else {
-                albedo / albedo::hemisphere_mean(under)
+                albedo / mean(&p)
             }
         };
         let weight = 1.0 - (1.0 - p.metallic) * p.transmission;
@@ -168,7 +168,11 @@ impl Bsdf {
         let chances = [
             brightness(dielectric + metal + p.sheen_albedo(v.z)),
             through * weight * reflected(f0, alpha),
-            p.coat * reflected(Vec3::splat(COAT_F0), p.coat_alpha.max(SMOOTHEST)),
+            if p.coat > 0.0 {
+                p.coat * reflected(Vec3::splat(COAT_F0), p.coat_alpha.max(SMOOTHEST))
+            } else {
+                0.0
+            },
             if glass.is_some() {
                 through * glass_share
             } else {
@@ -180,8 +184,8 @@ impl Bsdf {
             outside,
             v,
             through,
-            diffuse: over_mean(dielectric, &|c| p.under_dielectric(c)),
-            metal: over_mean(metal, &|c| p.under_metal(c)),
+            diffuse: over(dielectric, Parameters::mean_under_dielectric),
+            metal: over(metal, Parameters::mean_under_metal),
             f0,
             specular: weight,
             glass,
@@ -299,7 +303,8 @@ impl Bsdf {
         } else {
             let tint = Vec3::new(p.color.x.sqrt(), p.color.y.sqrt(), p.color.z.sqrt());
             let through = if p.inside {
-                self.outside.through(-l.z)
+                let (coat, sheen) = self.outside;
+                Parameters { coat, sheen, ..*p }.through(-l.z)
             } else {
                 self.through
             };

@@ -64,6 +64,28 @@ impl Parameters {
         self.through(cos) * (1.0 - albedo::reflection(self.f0, f90, cos, alpha))
     }
 
+    /// The mean of [`Self::under_dielectric`] over the hemisphere.
+    pub(super) fn mean_under_dielectric(&self) -> f32 {
+        if self.has_layers() {
+            return albedo::hemisphere_mean(|cos| self.under_dielectric(cos));
+        }
+        let f90 = fresnel::grazing(Vec3::splat(self.f0));
+        1.0 - albedo::reflection_mean(self.f0, f90, self.alpha.max(SMOOTHEST))
+    }
+
+    /// The mean of [`Self::under_metal`] over the hemisphere.
+    pub(super) fn mean_under_metal(&self) -> f32 {
+        if self.has_layers() {
+            return albedo::hemisphere_mean(|cos| self.under_metal(cos));
+        }
+        (1.0 - albedo::reflection_mean(1.0, 1.0, self.alpha.max(SMOOTHEST))).max(1e-6)
+    }
+
+    /// Whether there is a coat or a sheen.
+    fn has_layers(&self) -> bool {
+        self.coat != 0.0 || self.sheen != Vec3::ZERO
+    }
+
     /// What passes the layers and is lost in a metal's microfacets.
     pub(super) fn under_metal(&self, cos: f32) -> f32 {
         let alpha = self.alpha.max(SMOOTHEST);
@@ -100,7 +122,7 @@ impl Parameters {
     /// Schlick's mean F_avg (Kulla and Conty, with the square of Hill, "A Multi-Faceted Exploration", 2018).
     pub(super) fn metal_again(&self) -> Vec3 {
         let alpha = self.alpha.max(SMOOTHEST);
-        let kept = albedo::hemisphere_mean(|c| albedo::reflection(1.0, 1.0, c, alpha)).min(1.0);
+        let kept = albedo::reflection_mean(1.0, 1.0, alpha).min(1.0);
         let mean = self.color + (fresnel::grazing(self.color) - self.color) / 21.0;
         mean * mean * kept / (1.0 - mean * (1.0 - kept))
     }

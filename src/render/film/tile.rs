@@ -119,7 +119,11 @@ impl<'a> TileRenderer<'a> {
         let sampler = Sampler::new(place, index, self.seed);
         let placement = self.filter.place(index, sampler.point(dimension));
         let centre = place.as_vec2() + Vec2::splat(0.5);
-        let lens = sampler.point(Dimension::new(0, Purpose::Lens));
+        let lens = if self.camera.has_lens() {
+            sampler.point(Dimension::new(0, Purpose::Lens))
+        } else {
+            Vec2::ZERO
+        };
         let mut ray = self.camera.ray(centre + placement.offset, lens);
         ray.key = sampler.ray_key(dimension);
         (ray, sampler, placement.sign)

@@ -13,7 +13,7 @@ use super::super::{RenderInput, Surfaces};
 use super::CameraRay;
 use super::bodies::Bodies;
 use crate::ray::{Cone, Ray};
-use crate::scene::Material;
+use crate::scene::{Aov, Material};
 use crate::surface::SurfacePoint;
 use crate::trace::{Hit, RayOffset, Tracer};
 
@@ -32,6 +32,8 @@ pub struct Stage<'a> {
     offset: RayOffset,
     /// Whether any material has holes: only then a shadow ray must look at what it meets.
     has_holes: bool,
+    /// Whether the film keeps the albedo of first hits.
+    keeps_albedo: bool,
     /// Of camera rays.
     pub cone: Cone,
 }
@@ -61,6 +63,7 @@ impl<'a> Stage<'a> {
             object_materials: input.object_materials,
             offset: RayOffset::for_scene(input.tracer.bounds().diagonal()),
             has_holes: input.materials.iter().any(Material::has_holes),
+            keeps_albedo: input.film.aovs.has(Aov::Albedo),
             cone: Cone::from_eye(
                 input
                     .camera
@@ -112,7 +115,11 @@ impl<'a> Stage<'a> {
     pub fn first_hit(&self, met: &Met, shaded: &ShadedPoint) -> FirstHit {
         let point = &met.point;
         FirstHit {
-            albedo: shaded.bsdf().albedo(),
+            albedo: if self.keeps_albedo {
+                shaded.bsdf().albedo()
+            } else {
+                Vec3::ZERO
+            },
             normal: point.shading_normal,
             position: point.position,
             texcoord: point.texcoord,

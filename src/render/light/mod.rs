@@ -77,7 +77,7 @@ impl LightSample {
 }
 
 /// A light infinitely far away.
-pub trait InfiniteLight: Send + Sync {
+pub trait InfiniteLight {
     /// Radiance that arrives from the unit vector `direction`.
     fn radiance(&self, direction: Vec3) -> Vec3;
 
@@ -94,7 +94,7 @@ pub trait InfiniteLight: Send + Sync {
 }
 
 /// A light at some place in the scene.
-trait LocalLight: Send + Sync {
+trait LocalLight {
     /// A direction for the uniform point `u`, to light `position`.
     fn sample(&self, position: Vec3, u: Vec2) -> LightSample;
 
@@ -119,8 +119,8 @@ pub struct Receiver {
 
 /// All lights of a scene.
 pub struct Lights<'a> {
-    infinite: Vec<Box<dyn InfiniteLight>>,
-    local: Vec<Box<dyn LocalLight>>,
+    infinite: Vec<Infinite>,
+    local: Vec<Local>,
     meshes: Option<MeshLights<'a>>,
     choice: Cumulative,
     /// Whether each point is lit by all of them, or by one.
@@ -146,7 +146,7 @@ impl<'a> Lights<'a> {
             }
         }
         if input.lights.is_empty() && meshes.is_none() {
-            infinite.push(Box::new(WhiteWorld));
+            infinite.push(Infinite::White(WhiteWorld));
         }
         let radius = 0.5 * input.tracer.bounds().diagonal();
         // What a light from afar sends through the disk that the scene shows it.
@@ -246,10 +246,83 @@ impl<'a> Lights<'a> {
     }
 }
 
+/// The lights infinitely far away: a match instead of a table of functions, since every sample asks one.
+enum Infinite {
+    Sun(Sun),
+    Sky(Sky),
+    Environment(Environment),
+    Directional(DirectionalLight),
+    White(WhiteWorld),
+}
+
+/// The lights at some place.
+enum Local {
+    Sphere(SphereLight),
+    Flat(FlatLight),
+    Point(PointLight),
+}
+
+/// What a light of any kind answers.
+macro_rules! ask {
+    ($self:ident, $kind:ident: $($variant:ident)*, $light:ident => $answer:expr) => {
+        match $self {
+            $($kind::$variant($light) => $answer,)*
+        }
+    };
+}
+
+macro_rules! ask_infinite {
+    ($self:ident, $light:ident => $answer:expr) => {
+        ask!($self, Infinite: Sun Sky Environment Directional White, $light => $answer)
+    };
+}
+
+macro_rules! ask_local {
+    ($self:ident, $light:ident => $answer:expr) => {
+        ask!($self, Local: Sphere Flat Point, $light => $answer)
+    };
+}
+
+impl InfiniteLight for Infinite {
+    fn radiance(&self, direction: Vec3) -> Vec3 {
+        ask_infinite!(self, light => light.radiance(direction))
+    }
+
+    fn sample(&self, normal: Vec3, u: Vec2) -> LightSample {
+        ask_infinite!(self, light => light.sample(normal, u))
+    }
+
+    fn brightness(&self) -> f32 {
+        ask_infinite!(self, light => light.brightness())
+    }
+
+    fn pdf(&self, normal: Vec3, direction: Vec3) -> f32 {
+        ask_infinite!(self, light => light.pdf(normal, direction))
+    }
+}
+
+impl LocalLight for Local {
+    fn sample(&self, position: Vec3, u: Vec2) -> LightSample {
+        ask_local!(self, light => light.sample(position, u))
+    }
+
+    fn pdf(&self, position: Vec3, direction: Vec3) -> f32 {
+        ask_local!(self, light => light.pdf(position, direction))
+    }
+
+    fn meet(&self, origin: Vec3, direction: Vec3) -> Option<(f32, Vec3)> {
+        ask_local!(self, light => light.meet(origin, direction))
+    }
+
+    fn power(&self) -> f32 {
+        ask_local!(self, light => light.power())
+    }
+}
+
 /// A light ready to be sampled.
 enum Prepared {
-    Infinite(Box<dyn InfiniteLight>),
-    Local(Box<dyn LocalLight>),
+    Infinite(Infinite),
+    Local(Local),
 }
 
 fn one(light: &Light, air: f32) -> Prepared {
@@ -257,54 +330,60 @@ fn one(light: &Light, air: f32) -> Prepared {
         Light::Sun {
             direction,
             strength,
-        } => Prepared::infinite(Sun::new(direction, air, strength)),
+        } => Prepared::Infinite(Infinite::Sun(Sun::new(direction, air, strength))),
         Light::Sky {
             sun_direction,
             turbidity,
             strength,
-        } => Prepared::infinite(Sky::new(sun_direction, turbidity, strength)),
+        } => Prepared::Infinite(Infinite::Sky(Sky::new(sun_direction, turbidity, strength))),
         Light::Environment {
             ref image,
             rotation,
             strength,
-        } => Prepared::infinite(Environment::new(image.clone(), rotation, strength)),
+        } => Prepared::Infinite(Infinite::Environment(Environment::new(
+            image.clone(),
+            rotation,
+            strength,
+        ))),
         Light::Directional {
             direction,
             irradiance,
-        } => Prepared::infinite(DirectionalLight {
+        } => Prepared::Infinite(Infinite::Directional(DirectionalLight {
             direction,
             irradiance,
-        }),
+        })),
         Light::Sphere {
             center,
             radius,
             radiance,
-        } => Prepared::local(SphereLight {
+        } => Prepared::Local(Local::Sphere(SphereLight {
             center,
             radius,
             radiance,
-        }),
+        })),
         Light::Disk {
             center,
             normal,
             radius,
             radiance,
-        } => Prepared::local(FlatLight::disk(center, normal, radius, radiance)),
+        } => Prepared::Local(Local::Flat(FlatLight::disk(
+            center, normal, radius, radiance,
+        ))),
         Light::Rectangle {
             corner,
             edges,
             radiance,
-        } => Prepared::local(FlatLight::rectangle(corner, edges, radiance)),
+        } => Prepared::Local(Local::Flat(FlatLight::rectangle(corner, edges, radiance))),
         Light::Point {
             position,
             intensity,
             range,
-        } => Prepared::local(PointLight {
+        } => Prepared::Local(Local::Point(PointLight {
             position,
             intensity,
             range,
             cone: None,
-        }),
+        })),
         Light::Spot {
             position,
             direction,
@@ -312,7 +391,7 @@ fn one(light: &Light, air: f32) -> Prepared {
             cos_inner,
             intensity,
             range,
-        } => Prepared::local(PointLight {
+        } => Prepared::Local(Local::Point(PointLight {
             position,
             intensity,
             range,
@@ -321,17 +400,7 @@ fn one(light: &Light, air: f32) -> Prepared {
                 cos_outer,
                 cos_inner,
             }),
-        }),
-    }
-}
-
-impl Prepared {
-    fn infinite(light: impl InfiniteLight + 'static) -> Self {
-        Self::Infinite(Box::new(light))
-    }
-
-    fn local(light: impl LocalLight + 'static) -> Self {
-        Self::Local(Box::new(light))
+        })),
     }
 }
 

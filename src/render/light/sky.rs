@@ -37,10 +37,9 @@ impl Perez {
         Self(lines.map(|[slope, intercept]| slope * turbidity + intercept))
     }
 
-    /// The distribution at a zenith angle (by its cosine, positive) and an angle `gamma` from the sun.
-    fn value(&self, cos_zenith: f32, gamma: f32) -> f32 {
+    /// The distribution at a zenith angle (by its cosine, positive) and an angle `gamma` from the sun, with its cosine.
+    fn value(&self, cos_zenith: f32, gamma: f32, cos_gamma: f32) -> f32 {
         let [a, b, c, d, e] = self.0;
-        let cos_gamma = gamma.cos();
         (1.0 + a * (b / cos_zenith).exp())
             * (1.0 + c * (d * gamma).exp() + e * cos_gamma * cos_gamma)
     }
@@ -86,7 +85,10 @@ impl Dome {
         Self {
             sun_direction,
             distributions: std::array::from_fn(|i| {
-                (perez[i], zenith[i] / perez[i].value(1.0, sun_zenith))
+                (
+                    perez[i],
+                    zenith[i] / perez[i].value(1.0, sun_zenith, sun_zenith.cos()),
+                )
             }),
         }
     }
@@ -94,10 +96,11 @@ impl Dome {
     /// Linear sRGB in kcd/m^2 from a direction; directions below the horizon read the horizon.
     fn color(&self, direction: Vec3) -> Vec3 {
         let cos_zenith = direction.y.max(HORIZON);
-        let gamma = direction.dot(self.sun_direction).clamp(-1.0, 1.0).acos();
+        let cos_gamma = direction.dot(self.sun_direction).clamp(-1.0, 1.0);
+        let gamma = cos_gamma.acos();
         let [luminance, x, y] = self
             .distributions
-            .map(|(perez, scale)| scale * perez.value(cos_zenith, gamma));
+            .map(|(perez, scale)| scale * perez.value(cos_zenith, gamma, cos_gamma));
         xyz_to_rgb(xyy_to_xyz(x, y, luminance.max(0.0)))
     }
 }
