@@ -28,6 +28,7 @@ mod projection;
 mod pyramid;
 mod seams;
 pub(crate) mod smooth_normal;
+mod subdivide;
 mod texels;
 mod uv;
 
@@ -53,6 +54,7 @@ pub(crate) use pyramid::Entries;
 pub use pyramid::{Level, Pyramid};
 pub(crate) use seams::{ChartEdges, Ruled};
 pub use seams::{Seams, Wall};
+pub use subdivide::{Cage, Refined, Scheme, SubdivideError};
 pub(crate) use texels::{StoredTexels, Texel};
 pub use texels::{TexelKind, Texels};
 pub use uv::{UvTransform, Wrap};
