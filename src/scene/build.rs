@@ -3,6 +3,7 @@
 mod assets;
 mod frame;
 mod materials;
+mod subdivide;
 
 use std::f32::consts::PI;
 use std::fmt::Display;
@@ -19,7 +20,7 @@ use crate::image::Channel;
 use crate::prism::{March, PrismOptions};
 use crate::surface::{
     BaseMesh, DisplacedSurface, Displacement, DisplacementMap, Joined, MeshBuilder, NormalMode,
-    Projection, Seams, SurfaceError, Wrap,
+    Projection, Scheme, Seams, SurfaceError, Wrap,
 };
 use assets::Assets;
 
@@ -39,12 +40,27 @@ pub struct Loaded {
     pub scene: Scene,
     /// Its displacement maps, each file once.
     pub maps: Vec<MapFile>,
+    /// What became of meshes that are subdivided.
+    pub subdivided: Vec<Subdivided>,
     /// What was mended on the way, one line each.
     pub warnings: Vec<String>,
     /// Every file that was read: scene, meshes and what they name, pictures.
     pub files: Vec<PathBuf>,
     /// Where the file places the camera, if it does.
     eye: Option<Keyed<Vec3>>,
+}
+
+/// An object whose mesh is refined.
+#[derive(Clone, Copy, Debug)]
+pub struct Subdivided {
+    /// Index into `Scene::objects`.
+    pub object: usize,
+    /// Faces that its file has.
+    pub faces: usize,
+    /// The scheme.
+    pub scheme: Scheme,
+    /// How often they were refined.
+    pub levels: u32,
 }
 
 /// One mesh under one map, as named on a command line.
@@ -187,6 +203,16 @@ impl Default for Shaping {
     }
 }
 
+impl Shaping {
+    /// Of a mesh that is where it belongs, with the normals that it is to have.
+    fn done() -> Self {
+        Self {
+            join: Some(0.0),
+            ..Self::default()
+        }
+    }
+}
+
 /// Collects a scene.
 #[derive(Default)]
 struct Builder {
@@ -194,6 +220,7 @@ struct Builder {
     objects: Vec<SceneObject>,
     materials: Vec<Material>,
     default_material: Option<usize>,
+    subdivided: Vec<Subdivided>,
     warnings: Vec<String>,
     /// All that was read but pictures, which `assets` knows.
     files: Vec<PathBuf>,
@@ -205,22 +232,35 @@ impl Builder {
         let asset = |source: AssetError| table.file.asset(source);
         let named = self.material_index(table.material.as_ref())?;
         let name = table.name.clone().unwrap_or_else(|| stem(path));
-        let shaping = Shaping {
+        let mut shaping = Shaping {
             transform: table.transform,
             recompute_normals: table.recompute_normals,
             crease_angle: table.crease_angle,
             join: table.join,
+        };
+        let options = LoadOptions {
+            keep_polygons: subdivide::keeps_polygons(table.subdivision),
+            ..options
         };
         let mut loaded = load_mesh_with(path, options).map_err(|e| asset(e.into()))?;
         if let Some(projection) = table.texcoords {
             loaded.project(projection);
         }
         self.files.append(&mut loaded.files);
-        self.warn_all(path, loaded.warnings);
+        self.warn_all(path, std::mem::take(&mut loaded.warnings));
+        let refined = match table.subdivision {
+            Some(subdivision) => {
+                let (parts, sharpness) = (&mut loaded.parts, &loaded.sharpness);
+                let refined = self.subdivide(path, parts, sharpness, &shaping, subdivision);
+                shaping = Shaping::done();
+                refined.map_err(asset)?
+            }
+            None => Vec::new(),
+        };
         let single = loaded.parts.len() == 1;
         // By what they are: several may have one name, or none.
         let mut of_file: Vec<(FileMaterial, usize)> = Vec::new();
-        for part in loaded.parts {
+        for (number, part) in loaded.parts.into_iter().enumerate() {
             let name = if single {
                 name.clone()
             } else {
@@ -258,6 +298,17 @@ impl Builder {
                 }
                 None => ObjectShape::Plain(mesh),
             };
+            self.subdivided
+                .extend(
+                    refined
+                        .get(number)
+                        .map(|&(faces, scheme, levels)| Subdivided {
+                            object: self.objects.len(),
+                            faces,
+                            scheme,
+                            levels,
+                        }),
+                );
             self.objects.push(SceneObject {
                 name,
                 shape,
@@ -450,6 +501,7 @@ impl Builder {
         Loaded {
             files: self.files,
             maps: self.assets.into_maps(),
+            subdivided: self.subdivided,
             warnings: self.warnings,
             eye: None,
             scene: Scene {

@@ -7,7 +7,7 @@ use glam::{Affine3A, EulerRot, Quat, Vec3};
 use super::{Item, Keyed, STEP_TEXELS, SceneError, channel, file_path, keyed, uv_transform, wrap};
 use crate::image::Channel;
 use crate::prism::{EditBounds, Lod, March, PrismOptions, Step};
-use crate::surface::{Projection, Seams, UvTransform, Wrap};
+use crate::surface::{Projection, Scheme, Seams, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
 pub(in crate::scene) const SCALE: &str =
@@ -34,6 +34,7 @@ pub(in crate::scene) struct MeshTable {
     pub crease_angle: f32,
     /// Vertices no farther apart are joined, world units; default: what rounding explains.
     pub join: Option<f32>,
+    pub subdivision: Option<Subdivision>,
     /// Texture coordinates instead of the file's.
     pub texcoords: Option<Projection>,
     pub material: Option<Keyed<String>>,
@@ -41,6 +42,15 @@ pub(in crate::scene) struct MeshTable {
     pub transform: Affine3A,
     pub instances: Vec<Affine3A>,
     pub displacement: Option<DisplacementTable>,
+}
+
+/// How a mesh is subdivided before it is displaced.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::scene) struct Subdivision {
+    /// At least 1.
+    pub levels: u32,
+    /// Default: what the file's faces are for.
+    pub scheme: Option<Scheme>,
 }
 
 /// A displacement as written.
@@ -70,6 +80,8 @@ impl MeshTable {
             "normals",
             "crease_angle",
             "join",
+            "subdivide",
+            "subdivision",
             "texcoords",
             "material",
             "mask",
@@ -93,6 +105,7 @@ impl MeshTable {
             join: section.optional("join", |i| {
                 i.number("world units, at least 0", |x| x >= 0.0)
             })?,
+            subdivision: subdivision(&mut section)?,
             texcoords: section
                 .optional("texcoords", |i| i.word(&TEXCOORDS))?
                 .flatten(),
@@ -153,6 +166,28 @@ impl DisplacementTable {
             seams: seams(&mut section, march)?,
         })
     }
+}
+
+fn subdivision(section: &mut super::Section) -> Result<Option<Subdivision>, SceneError> {
+    /// More are beyond any memory.
+    const MOST: u32 = 12;
+    let levels = section.optional("subdivide", |i| i.integer(0..=MOST))?;
+    let Some(item) = section.get("subdivision") else {
+        let levels = levels.filter(|&levels| levels > 0);
+        return Ok(levels.map(|levels| Subdivision {
+            levels,
+            scheme: None,
+        }));
+    };
+    let Some(levels) = levels else {
+        return Err(item.error("no subdivide", "subdivide = N beside it"));
+    };
+    let words = [
+        ("catmull-clark", Scheme::CatmullClark),
+        ("loop", Scheme::Loop),
+    ];
+    let scheme = Some(item.word(&words)?);
+    Ok((levels > 0).then_some(Subdivision { levels, scheme }))
 }
 
 /// A map is displaced by one mode in both directions.

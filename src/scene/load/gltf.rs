@@ -74,6 +74,7 @@ pub(super) fn read(
         parts,
         warnings,
         files: buffers.files,
+        ..LoadedFile::default()
     })
 }
 

@@ -12,7 +12,7 @@ mod material;
 mod mtl;
 mod obj;
 mod ply;
-mod polygon;
+pub(super) mod polygon;
 mod text;
 
 use std::collections::HashMap;
@@ -125,6 +125,8 @@ pub enum LoadMeshErrorKind {
 pub struct LoadOptions {
     /// Whether a glTF file may name buffers and pictures outside of its own folder.
     pub allow_external: bool,
+    /// Whether polygons come as fans around their first corner, concave ones too, with [`Part::fans`] to tell them by: to be subdivided.
+    pub keep_polygons: bool,
 }
 
 /// A mesh file as read: not yet validated, nothing computed.
@@ -132,6 +134,8 @@ pub struct LoadOptions {
 pub struct LoadedFile {
     /// At least one, each with at least one triangle.
     pub parts: Vec<Part>,
+    /// What stays sharp when the file is subdivided.
+    pub sharpness: FileSharpness,
     /// What was ignored and why, one line each, for the user.
     pub warnings: Vec<String>,
     /// Every file that was read: the mesh file and what it names, pictures excepted.
@@ -145,10 +149,21 @@ pub struct Part {
     pub name: String,
     /// The faces, in file order.
     pub mesh: MeshBuilder,
+    /// How many triangles each polygon has, one after the other, if they are kept; empty: each triangle is a face.
+    pub fans: Vec<u32>,
     /// The file's material, if it gives one.
     pub material: Option<FileMaterial>,
     /// Empty: stands once as it is. Else where the file places it (EXT_mesh_gpu_instancing), as transforms of the mesh as it is.
     pub instances: Vec<Affine3A>,
+}
+
+/// Creases and corners for subdivision, by position as the file has it; sharpness is the number of refinements for which they last, from 10 on for ever.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FileSharpness {
+    /// Edges by their ends.
+    pub creases: Vec<([Vec3; 2], f32)>,
+    /// Vertices.
+    pub corners: Vec<(Vec3, f32)>,
 }
 
 /// Reads a mesh file; the format goes by the ending.
@@ -222,8 +237,8 @@ fn read(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshErrorKi
         return Err(LoadMeshErrorKind::Empty);
     }
     let mut file = match extension.as_str() {
-        "obj" => obj::read(&bytes, path)?,
-        "ply" => ply::read(&bytes, path)?,
+        "obj" => obj::read(&bytes, path, options)?,
+        "ply" => ply::read(&bytes, path, options)?,
         _ => gltf::read(&bytes, path, options)?,
     };
     if file.parts.is_empty() {
@@ -299,6 +314,7 @@ impl Parts {
             self.parts.push(Part {
                 name: name.to_owned(),
                 mesh: MeshBuilder::default(),
+                fans: Vec::new(),
                 material: None,
                 instances: placed.map_or_else(Vec::new, |p| p.1.to_vec()),
             });
