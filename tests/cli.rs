@@ -338,6 +338,24 @@ fn info_names_march_and_bounds() {
 }
 
 #[test]
+fn info_tells_what_a_subdivided_mesh_becomes() {
+    let folder = Folder::with_quad();
+    let keys = "subdivide = 3\nsubdivision = \"catmull-clark\"\n[mesh.displacement]";
+    folder.put("scene.toml", SCENE.replace("[mesh.displacement]", keys));
+    let text = done(&folder, &["info", "scene.toml"]);
+    assert!(
+        text.contains("Catmull-Clark, 3 levels of 2 faces"),
+        "{text}"
+    );
+    let info = done(&folder, &["info", "scene.toml", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&info).unwrap();
+    let object = &info["objects"][0];
+    assert_eq!(object["triangles"], 192);
+    assert_eq!(object["subdivision"]["levels"], 3);
+    done(&folder, &["render", "scene.toml", "-o", "picture.png"]);
+}
+
+#[test]
 fn the_command_line_wins_over_the_scenes_march() {
     let folder = Folder::with_quad();
     let noise = |i: u32| (i.wrapping_mul(0x9e37_79b9) >> 16) as u16;

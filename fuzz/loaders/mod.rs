@@ -91,6 +91,11 @@ macro_rules! mesh {
                     $file,
                     "\"\ntexcoords = \"box\"\nup = \"z\"\nunit = 0.5\n[mesh.displacement]\nmap = \"flat.png\"\nscale = -0.1\nwrap = \"mirror\"\n"
                 ),
+                concat!(
+                    "[[mesh]]\nfile = \"",
+                    $file,
+                    "\"\nsubdivide = 1\ncrease_angle = 40\ntransform = { scale = -2.0 }\n"
+                ),
             ]),
             is_text: $is_text,
         }

@@ -13,6 +13,7 @@ use super::memory::Memory;
 use crate::files::Outputs;
 use crate::prism::{March, PrismOptions, Step};
 use crate::scene::{Loaded, MapFile, ObjectShape};
+use crate::surface::Scheme;
 
 /// Tell what a scene is made of and what memory it takes
 ///
@@ -82,6 +83,8 @@ struct Object {
     name: String,
     triangles: usize,
     displaced: bool,
+    /// What the triangles are made of, if the file's faces are subdivided.
+    subdivision: Option<Subdivision>,
     /// That close its seams; 0 where they are open.
     walls: usize,
     /// How its prisms are made, if it is displaced.
@@ -90,6 +93,14 @@ struct Object {
     /// 1 for an object that stands where it is.
     instances: usize,
     material: String,
+}
+
+#[derive(Serialize)]
+struct Subdivision {
+    scheme: &'static str,
+    levels: u32,
+    /// Of the file.
+    faces: usize,
 }
 
 #[derive(Serialize)]
@@ -119,8 +130,20 @@ impl From<&MapFile> for Map {
 
 fn objects(loaded: &Loaded) -> Vec<Object> {
     let scene = &loaded.scene;
-    let object = |object: &crate::scene::SceneObject| Object {
+    let subdivision = |index: usize| {
+        let subdivided = loaded.subdivided.iter().find(|s| s.object == index)?;
+        Some(Subdivision {
+            scheme: match subdivided.scheme {
+                Scheme::CatmullClark => "Catmull-Clark",
+                Scheme::Loop => "Loop",
+            },
+            levels: subdivided.levels,
+            faces: subdivided.faces,
+        })
+    };
+    let object = |(index, object): (usize, &crate::scene::SceneObject)| Object {
         name: object.name.clone(),
+        subdivision: subdivision(index),
         triangles: triangles(&object.shape),
         displaced: matches!(object.shape, ObjectShape::Displaced(..)),
         walls: match &object.shape {
@@ -132,7 +155,7 @@ fn objects(loaded: &Loaded) -> Vec<Object> {
         instances: object.instances.len().max(1),
         material: scene.materials[object.material].name.clone(),
     };
-    scene.objects.iter().map(object).collect()
+    scene.objects.iter().enumerate().map(object).collect()
 }
 
 fn options(shape: &ObjectShape) -> Option<PrismOptions> {
@@ -186,6 +209,16 @@ impl fmt::Display for Info {
             write!(f, "  {name:32} {triangles:>11} {instances:>9}")?;
             if let (Some(march), Some(bounds)) = (&object.march, object.edit_bounds) {
                 write!(f, "  displaced: march {march}; edit bounds {bounds}")?;
+            }
+            if let Some(Subdivision {
+                scheme,
+                levels,
+                faces,
+            }) = &object.subdivision
+            {
+                let comma = if object.displaced { ";" } else { " " };
+                let levels = format!("{levels} {}", if *levels == 1 { "level" } else { "levels" });
+                write!(f, "{comma} {scheme}, {levels} of {faces} faces")?;
             }
             if object.walls > 0 {
                 write!(f, "; seams closed by {} walls", object.walls)?;

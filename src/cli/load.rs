@@ -16,6 +16,7 @@ impl LoadArgs {
     pub fn options(self) -> LoadOptions {
         LoadOptions {
             allow_external: self.allow_external,
+            ..LoadOptions::default()
         }
     }
 }

@@ -5,6 +5,7 @@ mod cameras;
 mod frame;
 mod lights;
 mod materials;
+mod subdivide;
 
 use std::f32::consts::PI;
 use std::fmt::Display;
@@ -24,7 +25,7 @@ use crate::image::Channel;
 use crate::prism::{March, PrismOptions};
 use crate::surface::{
     BaseMesh, DisplacedSurface, Displacement, DisplacementMap, Joined, MeshBuilder, NormalMode,
-    Projection, Seams, SurfaceError, Wrap,
+    Projection, Scheme, Seams, SurfaceError, Wrap,
 };
 pub(super) use assets::Assets;
 pub(super) use frame::reach;
@@ -45,6 +46,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// Its displacement maps, each file once.
     pub maps: Vec<MapFile>,
+    /// What became of meshes that are subdivided.
+    pub subdivided: Vec<Subdivided>,
     /// What was mended on the way, one line each.
     pub warnings: Vec<String>,
     /// What was taken of mesh files without being asked for, one line each.
@@ -55,6 +58,19 @@ pub struct Loaded {
     eye: Option<Keyed<()>>,
     /// The material of meshes that nothing is said of, if there are such.
     pub(super) default_material: Option<usize>,
+}
+
+/// An object whose mesh is refined.
+#[derive(Clone, Copy, Debug)]
+pub struct Subdivided {
+    /// Index into `Scene::objects`.
+    pub object: usize,
+    /// Faces that its file has.
+    pub faces: usize,
+    /// The scheme.
+    pub scheme: Scheme,
+    /// How often they were refined.
+    pub levels: u32,
 }
 
 /// One mesh under one map, as named on a command line.
@@ -221,6 +237,16 @@ struct UnusedOfFile {
     cameras: usize,
 }
 
+impl Shaping {
+    /// Of a mesh that is where it belongs, with the normals that it is to have.
+    fn done() -> Self {
+        Self {
+            join: Some(0.0),
+            ..Self::default()
+        }
+    }
+}
+
 /// Collects a scene.
 #[derive(Default)]
 struct Builder {
@@ -234,6 +260,7 @@ struct Builder {
     cameras: Vec<cameras::Offered>,
     /// What has no effect, by mesh file.
     unused: Vec<(PathBuf, UnusedOfFile)>,
+    subdivided: Vec<Subdivided>,
     warnings: Vec<String>,
     notes: Vec<String>,
     /// All that was read but pictures, which `assets` knows.
@@ -246,11 +273,15 @@ impl Builder {
         let asset = |source: AssetError| table.file.asset(source);
         let named = self.material_index(table.material.as_ref())?;
         let name = table.name.clone().unwrap_or_else(|| stem(path));
-        let shaping = Shaping {
+        let mut shaping = Shaping {
             transform: table.transform,
             recompute_normals: table.recompute_normals,
             crease_angle: table.crease_angle,
             join: table.join,
+        };
+        let options = LoadOptions {
+            keep_polygons: subdivide::keeps_polygons(table.subdivision),
+            ..options
         };
         let mut loaded = match table.shape {
             Some(shape) => shape.load(),
@@ -266,12 +297,21 @@ impl Builder {
         }
         self.lights_and_cameras(table, &loaded)?;
         self.files.append(&mut loaded.files);
-        self.warn_all(path, loaded.warnings);
-        self.unused_of(path).kinds = loaded.unused;
+        self.warn_all(path, std::mem::take(&mut loaded.warnings));
+        self.unused_of(path).kinds = std::mem::take(&mut loaded.unused);
+        let refined = match table.subdivision {
+            Some(subdivision) => {
+                let (parts, sharpness) = (&mut loaded.parts, &loaded.sharpness);
+                let refined = self.subdivide(path, parts, sharpness, &shaping, subdivision);
+                shaping = Shaping::done();
+                refined.map_err(asset)?
+            }
+            None => Vec::new(),
+        };
         let single = loaded.parts.len() == 1;
         // By what they are: several may have one name, or none.
         let mut of_file: Vec<(FileMaterial, usize)> = Vec::new();
-        for part in loaded.parts {
+        for (number, part) in loaded.parts.into_iter().enumerate() {
             let name = if single {
                 name.clone()
             } else {
@@ -309,6 +349,17 @@ impl Builder {
                 }
                 None => ObjectShape::Plain(mesh),
             };
+            self.subdivided
+                .extend(
+                    refined
+                        .get(number)
+                        .map(|&(faces, scheme, levels)| Subdivided {
+                            object: self.objects.len(),
+                            faces,
+                            scheme,
+                            levels,
+                        }),
+                );
             self.objects.push(SceneObject {
                 name,
                 shape,
@@ -478,6 +529,7 @@ impl Builder {
         Loaded {
             files: self.files,
             maps: self.assets.into_maps(),
+            subdivided: self.subdivided,
             warnings: self.warnings,
             notes: self.notes,
             eye: None,

@@ -157,6 +157,14 @@ pub enum AssetError {
         /// Why.
         source: crate::surface::MeshError,
     },
+    /// The polygons of a mesh file cannot be subdivided.
+    #[error("{}: {source}", path.display())]
+    Subdivision {
+        /// The mesh file.
+        path: PathBuf,
+        /// Why.
+        source: crate::surface::SubdivideError,
+    },
     /// A map's heights displace the mesh by too much.
     #[error("{}: {source} (on {part})", path.display())]
     Heights {

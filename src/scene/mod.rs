@@ -23,7 +23,7 @@ use glam::Affine3A;
 use crate::prism::PrismOptions;
 use crate::surface::{BaseMesh, DisplacedSurface};
 
-pub use build::{Loaded, MapFile, MeshAndMap};
+pub use build::{Loaded, MapFile, MeshAndMap, Subdivided};
 pub use camera::{Camera, Lens, Projection};
 pub use error::{AssetError, Place, SceneError, UntraceableError};
 pub(crate) use file::{MAX_SIDE, MAX_SPP, MAX_STOPS, STEP_TEXELS, fits, too_many_pixels};

@@ -29,6 +29,7 @@ mod projection;
 mod pyramid;
 mod seams;
 pub(crate) mod smooth_normal;
+mod subdivide;
 mod texels;
 mod uv;
 
@@ -55,6 +56,7 @@ pub use pyramid::{Level, Pyramid};
 pub(crate) use seams::{ChartEdges, Ruled};
 pub use seams::{Seams, Wall};
 pub use smooth_normal::ShadingNormals;
+pub use subdivide::{Cage, Refined, Scheme, SubdivideError};
 pub(crate) use texels::{StoredTexels, Texel};
 pub use texels::{TexelKind, Texels};
 pub use uv::{UvTransform, Wrap};

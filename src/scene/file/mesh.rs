@@ -11,7 +11,7 @@ use super::{
 use crate::image::Channel;
 use crate::prism::{EditBounds, Lod, March, PrismOptions, Step};
 use crate::scene::load::Shape;
-use crate::surface::{Projection, Seams, ShadingNormals, UvTransform, Wrap};
+use crate::surface::{Projection, Scheme, Seams, ShadingNormals, UvTransform, Wrap};
 
 /// What `scale` of a displacement is.
 pub(in crate::scene) const SCALE: &str =
@@ -59,6 +59,7 @@ pub(in crate::scene) struct MeshTable {
     pub crease_angle: f32,
     /// Vertices no farther apart are joined, world units; default: what rounding explains.
     pub join: Option<f32>,
+    pub subdivision: Option<Subdivision>,
     /// Texture coordinates instead of the file's.
     pub texcoords: Option<Projection>,
     pub material: Option<Keyed<String>>,
@@ -66,6 +67,15 @@ pub(in crate::scene) struct MeshTable {
     pub transform: Affine3A,
     pub instances: Vec<Affine3A>,
     pub displacement: Option<DisplacementTable>,
+}
+
+/// How a mesh is subdivided before it is displaced.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::scene) struct Subdivision {
+    /// At least 1.
+    pub levels: u32,
+    /// Default: what the file's faces are for.
+    pub scheme: Option<Scheme>,
 }
 
 /// A displacement as written.
@@ -101,6 +111,8 @@ impl MeshTable {
             "normals",
             "crease_angle",
             "join",
+            "subdivide",
+            "subdivision",
             "texcoords",
             "material",
             "mask",
@@ -130,6 +142,7 @@ impl MeshTable {
             join: section.optional("join", |i| {
                 i.number("world units, at least 0", |x| x >= 0.0)
             })?,
+            subdivision: subdivision(&mut section)?,
             texcoords: section
                 .optional("texcoords", |i| i.word(&TEXCOORDS))?
                 .flatten(),
@@ -212,6 +225,28 @@ impl DisplacementTable {
             seams: seams(&mut section, march)?,
         })
     }
+}
+
+fn subdivision(section: &mut super::Section) -> Result<Option<Subdivision>, SceneError> {
+    /// More are beyond any memory.
+    const MOST: u32 = 12;
+    let levels = section.optional("subdivide", |i| i.integer(0..=MOST))?;
+    let Some(item) = section.get("subdivision") else {
+        let levels = levels.filter(|&levels| levels > 0);
+        return Ok(levels.map(|levels| Subdivision {
+            levels,
+            scheme: None,
+        }));
+    };
+    let Some(levels) = levels else {
+        return Err(item.error("no subdivide", "subdivide = N beside it"));
+    };
+    let words = [
+        ("catmull-clark", Scheme::CatmullClark),
+        ("loop", Scheme::Loop),
+    ];
+    let scheme = Some(item.word(&words)?);
+    Ok((levels > 0).then_some(Subdivision { levels, scheme }))
 }
 
 /// A map is displaced by one mode in both directions.

@@ -22,7 +22,7 @@ pub(super) use light::{LightTable, default_sun};
 pub(super) use material::{
     ColorTable, DetailTable, MaterialTable, ScalarTable, ScalarTextureTable, TextureTable,
 };
-pub(super) use mesh::{DisplacementTable, MeshTable, SCALE, TEXCOORDS};
+pub(super) use mesh::{DisplacementTable, MeshTable, SCALE, Subdivision, TEXCOORDS};
 pub(super) use overrides::OPTION;
 use overrides::Override;
 use reader::{Item, Section, Source};

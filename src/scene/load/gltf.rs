@@ -84,6 +84,7 @@ pub(super) fn read(
         warnings: texcoords.warnings,
         unused,
         files: buffers.files,
+        ..LoadedFile::default()
     })
 }
 

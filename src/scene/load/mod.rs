@@ -15,7 +15,7 @@ mod mtl;
 mod obj;
 mod placing;
 mod ply;
-mod polygon;
+pub(super) mod polygon;
 mod shape;
 mod text;
 mod unused;
@@ -136,6 +136,8 @@ pub enum LoadMeshErrorKind {
 pub struct LoadOptions {
     /// Whether a glTF file may name buffers and pictures outside of its own folder.
     pub allow_external: bool,
+    /// Whether polygons come as fans around their first corner, concave ones too, with [`Part::fans`] to tell them by: to be subdivided.
+    pub keep_polygons: bool,
 }
 
 /// A mesh file as read: not yet validated, nothing computed.
@@ -143,6 +145,8 @@ pub struct LoadOptions {
 pub struct LoadedFile {
     /// At least one, each with at least one triangle.
     pub parts: Vec<Part>,
+    /// What stays sharp when the file is subdivided.
+    pub sharpness: FileSharpness,
     /// In the file's order.
     pub lights: Vec<FileLight>,
     /// In the file's order.
@@ -162,10 +166,21 @@ pub struct Part {
     pub name: String,
     /// The faces, in file order.
     pub mesh: MeshBuilder,
+    /// How many triangles each polygon has, one after the other, if they are kept; empty: each triangle is a face.
+    pub fans: Vec<u32>,
     /// The file's material, if it gives one.
     pub material: Option<FileMaterial>,
     /// Empty: stands once as it is. Else where the file places it (EXT_mesh_gpu_instancing), as transforms of the mesh as it is.
     pub instances: Vec<Affine3A>,
+}
+
+/// Creases and corners for subdivision, by position as the file has it; sharpness is the number of refinements for which they last, from 10 on for ever.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FileSharpness {
+    /// Edges by their ends.
+    pub creases: Vec<([Vec3; 2], f32)>,
+    /// Vertices.
+    pub corners: Vec<(Vec3, f32)>,
 }
 
 /// Reads a mesh file; the format goes by the ending.
@@ -277,8 +292,8 @@ fn read(path: &Path, options: LoadOptions) -> Result<LoadedFile, LoadMeshErrorKi
         return Err(LoadMeshErrorKind::Empty);
     }
     let mut file = match extension.as_str() {
-        "obj" => obj::read(&bytes, path)?,
-        "ply" => ply::read(&bytes, path)?,
+        "obj" => obj::read(&bytes, path, options)?,
+        "ply" => ply::read(&bytes, path, options)?,
         _ => gltf::read(&bytes, path, options)?,
     };
     if file.parts.is_empty() {
@@ -362,6 +377,7 @@ impl Parts {
             self.parts.push(Part {
                 name: name.to_owned(),
                 mesh: MeshBuilder::default(),
+                fans: Vec::new(),
                 material: None,
                 instances: placed.map_or_else(Vec::new, |p| p.1.to_vec()),
             });

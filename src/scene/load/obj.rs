@@ -2,6 +2,8 @@
 //!
 //! A positive index may name what stands further down, so the file is gone through twice.
 
+mod tags;
+
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::num::NonZeroU32;
@@ -11,27 +13,32 @@ use glam::{Vec2, Vec3};
 
 use super::mtl::Libraries;
 use super::polygon::Triangulator;
-use super::{LoadMeshErrorKind, LoadedFile, Parts, Unused, text};
+use super::{FileSharpness, LoadMeshErrorKind, LoadOptions, LoadedFile, Parts, Unused, text};
 
 /// Reads the bytes of the file at `path`.
-pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+pub(super) fn read(
+    bytes: &[u8],
+    path: &Path,
+    options: LoadOptions,
+) -> Result<LoadedFile, LoadMeshErrorKind> {
     let text = text::plain(bytes).map_err(|line| LoadMeshErrorKind::NotText { line })?;
     let data = Data::read(&text)?;
     let mut libraries = Libraries::new(path, &data.materials);
     for name in &data.libraries {
         libraries.open(name);
     }
-    let mut faces = Faces::new(&data, &libraries);
+    let mut faces = Faces::new(&data, &libraries, options);
     for (line, statement) in text::statements(&text) {
         faces.statement(line, &statement)?;
     }
     let more = faces.warnings();
-    let parts = faces.parts;
+    let (parts, sharpness) = (faces.parts, faces.sharpness);
     let mut unused = data.unused();
     let (materials, files, mut warnings) = libraries.finish(&mut unused);
     warnings.extend(more);
     Ok(LoadedFile {
         parts: parts.finish(|index| materials.get(index).cloned()),
+        sharpness,
         warnings,
         unused,
         files,
@@ -87,7 +94,7 @@ impl Data {
                 b"s" => {
                     data.smoothing.insert(rest.to_owned());
                 }
-                b"f" | b"fo" | b"o" | b"g" | b"" => {}
+                b"f" | b"fo" | b"o" | b"g" | b"t" | b"" => {}
                 other => *data.others.entry(other.to_owned()).or_default() += 1,
             }
         }
@@ -140,8 +147,10 @@ struct Faces<'a> {
     /// Of the face at hand.
     corners: Vec<Corner>,
     positions: Vec<Vec3>,
+    sharpness: FileSharpness,
     without_normals: Dropped,
     without_texcoords: Dropped,
+    unread_tags: Dropped,
 }
 
 /// Indices, counted from 1 as the file counts.
@@ -165,42 +174,47 @@ struct Counts {
     vn: usize,
 }
 
-/// Faces that lost something.
+/// Lines that lost something, faces most of them.
 #[derive(Default)]
 struct Dropped {
-    faces: usize,
+    lines: usize,
     first_line: usize,
 }
 
 impl Dropped {
     fn add(&mut self, line: usize) {
-        if self.faces == 0 {
+        if self.lines == 0 {
             self.first_line = line;
         }
-        self.faces += 1;
+        self.lines += 1;
     }
 
-    fn warning(&self, what: &str) -> Option<String> {
-        let Self { faces, first_line } = self;
-        (*faces > 0).then(|| format!("{what}: {faces} faces, the first at line {first_line}"))
+    fn warning(&self, what: &str, lines: &str) -> Option<String> {
+        let Self {
+            lines: count,
+            first_line,
+        } = self;
+        (*count > 0).then(|| format!("{what}: {count} {lines}, the first at line {first_line}"))
     }
 }
 
 impl<'a> Faces<'a> {
-    fn new(data: &'a Data, libraries: &'a Libraries<'a>) -> Self {
+    fn new(data: &'a Data, libraries: &'a Libraries<'a>, options: LoadOptions) -> Self {
         Self {
             data,
             libraries,
             parts: Parts::default(),
             vertices: HashMap::new(),
-            triangulator: Triangulator::new(),
+            triangulator: Triangulator::new(options.keep_polygons),
             group: String::new(),
             material: None,
             so_far: Counts::default(),
             corners: Vec::new(),
             positions: Vec::new(),
+            sharpness: FileSharpness::default(),
             without_normals: Dropped::default(),
             without_texcoords: Dropped::default(),
+            unread_tags: Dropped::default(),
         }
     }
 
@@ -218,6 +232,12 @@ impl<'a> Faces<'a> {
                     return Err(syntax(line, statement, "a face of at least 3 corners"));
                 }
                 self.add_face();
+            }
+            b"t" => {
+                let positions = &self.data.positions;
+                if tags::read(rest, positions, &mut self.sharpness).is_none() {
+                    self.unread_tags.add(line);
+                }
             }
             _ => {}
         }
@@ -265,7 +285,12 @@ impl<'a> Faces<'a> {
         self.positions.extend(positions);
         let textured = self.corners[0].vt.is_some();
         let part = self.parts.open(&self.group, self.material, textured, None);
-        for triangle in self.triangulator.cut(&self.positions) {
+        let keeps_polygons = self.triangulator.keeps_polygons();
+        let triangles = self.triangulator.cut(&self.positions);
+        if keeps_polygons {
+            self.parts.parts[part].fans.push(triangles.len() as u32);
+        }
+        for triangle in triangles {
             let triangle = triangle.map(|i| {
                 let corner = self.corners[i as usize];
                 match self.vertices.entry((part as u32, corner)) {
@@ -284,10 +309,17 @@ impl<'a> Faces<'a> {
 
     fn warnings(&self) -> Vec<String> {
         let lost = [
-            self.without_normals
-                .warning("normals are out of range or not finite, and are computed instead"),
+            self.without_normals.warning(
+                "normals are out of range or not finite, and are computed instead",
+                "faces",
+            ),
             self.without_texcoords.warning(
                 "texture coordinates are out of range or missing at a corner, and are left out",
+                "faces",
+            ),
+            self.unread_tags.warning(
+                "creases or corners for subdivision that are no such, and are left out",
+                "lines",
             ),
             self.triangulator.warning(),
         ];

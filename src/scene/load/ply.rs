@@ -16,15 +16,19 @@ use ply_rs_bw::parser::ParseError;
 use super::locate::Locator;
 use super::polygon::Triangulator;
 use super::{
-    FileColor, FileMaterial, FileTexture, FileTextureUse, LoadMeshErrorKind, LoadedFile, Parts,
-    Unused, text,
+    FileColor, FileMaterial, FileTexture, FileTextureUse, LoadMeshErrorKind, LoadOptions,
+    LoadedFile, Parts, Unused, text,
 };
 use crate::surface::{UvTransform, Wrap};
 use header::{Element, Header, is_list};
 use source::{Face, Skipped, Source, Vertex};
 
 /// Reads the bytes of the file at `path`.
-pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErrorKind> {
+pub(super) fn read(
+    bytes: &[u8],
+    path: &Path,
+    options: LoadOptions,
+) -> Result<LoadedFile, LoadMeshErrorKind> {
     let header = Header::read(bytes)?;
     check_counts(&header)?;
     let has = |name: &str| {
@@ -71,7 +75,8 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<LoadedFile, LoadMeshErro
         .map(|name| textured_material(&mut locator, path, name, &mut warnings))
         .collect();
     let lost = vertices.lost_normals;
-    let mut builder = Builder::new(vertices, &faces, materials.len());
+    let triangulator = Triangulator::new(options.keep_polygons);
+    let mut builder = Builder::new(vertices, &faces, materials.len(), triangulator);
     builder.add(&faces);
     if lost > 0 {
         warnings.push(format!(
@@ -338,14 +343,14 @@ struct Builder {
 }
 
 impl Builder {
-    fn new(vertices: Vertices, faces: &Faces, textures: usize) -> Self {
+    fn new(vertices: Vertices, faces: &Faces, textures: usize, triangulator: Triangulator) -> Self {
         Self {
             vertices,
             textures,
             whole: faces.texcoords.is_empty() && textures == 0,
             parts: Parts::default(),
             known: HashMap::new(),
-            triangulator: Triangulator::new(),
+            triangulator,
         }
     }
 
@@ -378,7 +383,12 @@ impl Builder {
         let texture = usize::try_from(polygon.texture).ok();
         let texture = texture.filter(|&t| textured && t < self.textures);
         let part = self.parts.open("", texture, textured, None);
-        for triangle in self.triangulator.cut(positions) {
+        let keeps_polygons = self.triangulator.keeps_polygons();
+        let triangles = self.triangulator.cut(positions);
+        if keeps_polygons {
+            self.parts.parts[part].fans.push(triangles.len() as u32);
+        }
+        for triangle in triangles {
             let triangle = triangle.map(|i| {
                 let i = i as usize;
                 if self.whole {

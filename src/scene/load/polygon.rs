@@ -18,7 +18,7 @@ const MOST_EARS: usize = 128;
 const CLEARLY_SHORTER: f64 = 1e-3;
 
 /// Cuts the polygons of one file.
-pub(super) struct Triangulator {
+pub(in crate::scene) struct Triangulator {
     earcut: Earcut<f64>,
     /// The corners as seen along the normal, counter-clockwise, repeated ones left out.
     flat: Vec<DVec2>,
@@ -27,11 +27,14 @@ pub(super) struct Triangulator {
     clipped: Vec<u32>,
     triangles: Vec<[u32; 3]>,
     given_up: usize,
+    keeps_polygons: bool,
 }
 
 impl Triangulator {
-    pub(super) fn new() -> Self {
+    /// One that keeps polygons cuts each into a fan of n - 2 triangles around its first corner, whatever its shape.
+    pub(in crate::scene) fn new(keeps_polygons: bool) -> Self {
         Self {
+            keeps_polygons,
             earcut: Earcut::new(),
             flat: Vec::new(),
             numbers: Vec::new(),
@@ -41,11 +44,17 @@ impl Triangulator {
         }
     }
 
+    /// Whether a file's polygons can be told from its triangles.
+    pub(super) fn keeps_polygons(&self) -> bool {
+        self.keeps_polygons
+    }
+
     /// The triangles over the corners' numbers, as the polygon winds: n - 2, or fewer where corners coincide. None of fewer than three corners.
-    pub(super) fn cut(&mut self, corners: &[Vec3]) -> &[[u32; 3]] {
+    pub(in crate::scene) fn cut(&mut self, corners: &[Vec3]) -> &[[u32; 3]] {
         self.triangles.clear();
         match *corners {
             [] | [_] | [_, _] => {}
+            _ if self.keeps_polygons => self.fan(corners.len()),
             [_, _, _] => self.triangles.push([0, 1, 2]),
             [a, b, c, d] if a != b && b != c && c != d && d != a => self.cut_quad([a, b, c, d]),
             _ => self.cut_polygon(corners),

@@ -27,6 +27,7 @@ impl Shape {
                 mesh,
                 material: None,
                 instances: Vec::new(),
+                fans: vec![2],
             }],
             ..LoadedFile::default()
         }

@@ -4,7 +4,7 @@ use super::*;
 use glam::{Quat, Vec2};
 
 fn cut(corners: &[Vec3]) -> (Vec<[u32; 3]>, bool) {
-    let mut triangulator = Triangulator::new();
+    let mut triangulator = Triangulator::new(false);
     let triangles = triangulator.cut(corners).to_vec();
     (triangles, triangulator.warning().is_some())
 }

@@ -340,6 +340,7 @@ fn files_outside_of_the_folder_need_leave() {
     let path = inner.join("m.gltf");
     let allowed = LoadOptions {
         allow_external: true,
+        ..LoadOptions::default()
     };
     let absolute = folder.path().join("data.bin").display().to_string();
     for uri in [
