@@ -34,6 +34,7 @@ fn what_is_saved_is_what_is_rendered() {
         "render quad.obj --displacement bumps.png",
         "render quad.obj --displacement bumps.png --color paint.png --roughness 0.3 --floor --integrator path",
         "render pyramid.obj --texcoords box --displacement bumps.png --uv-scale 2,1 --normals smooth --view top --orbit 10,-20",
+        "render pyramid.obj --texcoords spherical --displacement bumps.png --subdivide 2 --up z --unit cm",
         "render pyramid.obj --floor --exposure 1 --filter box --clamp 5 --seed 9 --adaptive-threshold 0.1",
         "render quad.obj --displacement bumps.png --scale -0.1 --midlevel 0.5 --dt 0.5 --wrap mirror --metallic paint.png",
         "render quad.obj --displacement bumps.png --lod cone --tone agx --aovs N,Z --crop 3,4,30,20",

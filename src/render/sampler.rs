@@ -21,13 +21,11 @@ pub enum Purpose {
     Bounce,
     /// Which lobe of the material it is drawn from, and whether the path ends instead.
     Lobe,
-    /// Which light is sampled.
-    LightChoice,
     /// Whether a ray slips through a hole.
     Opacity,
     /// Where on the lens the camera ray starts.
     Lens,
-    /// Point on the light of this index.
+    /// Point on the light of this index, or which of them and where on it.
     Light(u32),
 }
 
@@ -51,7 +49,6 @@ impl Dimension {
             Purpose::Film => 0,
             Purpose::Bounce => 1,
             Purpose::Lobe => u32::MAX,
-            Purpose::LightChoice => u32::MAX - 1,
             Purpose::Opacity => u32::MAX - 2,
             Purpose::Lens => u32::MAX - 3,
             Purpose::Light(index) => index.wrapping_add(2),

@@ -251,11 +251,6 @@ impl DisplacedSurface {
         (self.shading == ShadingNormals::Smooth).then(|| self.frames().of(triangle))
     }
 
-    /// Bytes of these frames; 0 as long as no one has asked for a smooth normal.
-    pub fn frame_bytes(&self) -> usize {
-        self.frames.get().map_or(0, |frames| frames.bytes())
-    }
-
     /// The same over other vertices of the mesh, and with frames of those: open seams only, for walls depend on normals.
     pub(super) fn with_vertices(
         &self,

@@ -146,11 +146,6 @@ impl Frames {
             self.frames[i].lerp(&other.frames[i], part)
         })
     }
-
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&*self.corners) + size_of_val(&self.frames[..])
-    }
 }
 
 /// The derivatives along the map's axes of what is linear over a triangle; `None` where it is a line in the map.

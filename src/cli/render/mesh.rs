@@ -60,6 +60,15 @@ pub struct MeshArgs {
     /// Where the mesh's normals come from [default: file]
     #[arg(long, value_enum, value_name = "KIND", help_heading = MESH)]
     normals: Option<NormalKind>,
+    /// Refine the mesh N times to a smooth one before it is displaced
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=12), help_heading = MESH)]
+    subdivide: Option<u32>,
+    /// Which axis of the mesh file points up [default: y]
+    #[arg(long, value_name = "AXIS", value_parser = ["y", "z"], help_heading = MESH)]
+    up: Option<String>,
+    /// World units in one unit of the mesh file: a number, or mm, cm, m, in, ft where world units are metres [default: 1]
+    #[arg(long, value_name = "U", help_heading = MESH)]
+    unit: Option<String>,
     /// Side that the camera looks at [default: three-quarter]
     #[arg(long, value_name = "SIDE", value_parser = parse::word(View::NAMES), help_heading = STAGE)]
     view: Option<View>,
@@ -161,6 +170,9 @@ impl MeshArgs {
             wrap,
             texcoords,
             normals,
+            subdivide,
+            up,
+            unit,
             view,
             orbit,
             light,
@@ -181,6 +193,9 @@ impl MeshArgs {
             ("--wrap", wrap.is_some()),
             ("--texcoords", texcoords.is_some()),
             ("--normals", normals.is_some()),
+            ("--subdivide", subdivide.is_some()),
+            ("--up", up.is_some()),
+            ("--unit", unit.is_some()),
             ("--view", view.is_some()),
             ("--orbit", orbit.is_some()),
             ("--light", light.is_some()),
@@ -197,6 +212,9 @@ impl MeshArgs {
         Ok(Lookdev {
             mesh: mesh.to_owned(),
             smooth_normals: self.normals == Some(NormalKind::Smooth),
+            subdivide: self.subdivide,
+            up: self.up.clone(),
+            unit: self.unit.clone(),
             texcoords: self.texcoords.and_then(TexcoordKind::projection),
             maps: self.maps(quiet)?,
             channel: self.channel.clone(),

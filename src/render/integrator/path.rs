@@ -228,15 +228,11 @@ impl<'a> Path<'a> {
     fn direct(&self, walk: &mut Walk, met: &Met, point: &ShadedPoint, allowed: Allowed) {
         let receiver = point.receiver();
         let depth = walk.bounces.total();
-        let choice = walk
-            .sampler
-            .point(Dimension::new(depth, Purpose::LightChoice))
-            .x;
         let mut sum = Vec3::ZERO;
         for index in 0..self.lights.samples() {
             let dimension = Dimension::new(depth, Purpose::Light(index as u32));
             let u = walk.sampler.point(dimension);
-            let sample = self.lights.sample(index, &receiver, choice, u);
+            let sample = self.lights.sample(index, &receiver, u);
             if sample.pdf <= 0.0 {
                 continue;
             }

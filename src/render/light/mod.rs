@@ -180,12 +180,14 @@ impl<'a> Lights<'a> {
         self.infinite.len() + self.local.len() + usize::from(self.meshes.is_some())
     }
 
-    /// The sample of number `index` of a point's [`samples`](Self::samples); `choice` and `u` are uniform in [0, 1).
-    pub fn sample(&self, index: usize, receiver: &Receiver, choice: f32, u: Vec2) -> LightSample {
+    /// The sample of number `index` of a point's [`samples`](Self::samples); `u` is uniform in [0, 1)^2.
+    pub fn sample(&self, index: usize, receiver: &Receiver, mut u: Vec2) -> LightSample {
         let index = if self.all {
             index
         } else {
-            self.choice.choose(choice).0
+            let (index, rest) = self.choice.choose(u.x);
+            u.x = rest;
+            index
         };
         let mut sample = self.of(index, receiver, u);
         sample.pdf *= self.chance(index);

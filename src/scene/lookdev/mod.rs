@@ -36,6 +36,12 @@ pub struct Lookdev {
     pub mesh: PathBuf,
     /// Normals are computed even where the file has some.
     pub smooth_normals: bool,
+    /// How often the mesh is refined before it is displaced.
+    pub subdivide: Option<u32>,
+    /// The file's axis that points up, as scene files have it.
+    pub up: Option<String>,
+    /// What one unit of the file is: a number or a word, as scene files have it.
+    pub unit: Option<String>,
     /// Texture coordinates instead of the file's.
     pub texcoords: Option<Projection>,
     /// Pictures, all laid on alike.

@@ -65,6 +65,12 @@ pub(super) fn scene(
     Ok(text.out)
 }
 
+/// Whether files of this kind may have lights: what is here for a first look has its own.
+fn brings_lights(mesh: &Path) -> bool {
+    let ending = mesh.extension().unwrap_or_default();
+    ending.eq_ignore_ascii_case("gltf") || ending.eq_ignore_ascii_case("glb")
+}
+
 struct Text<'a> {
     out: String,
     folder: Option<&'a Path>,
@@ -177,6 +183,24 @@ impl Text<'_> {
         self.line("[[mesh]]");
         let file = self.path(&request.mesh)?;
         self.key("file", file);
+        if let Some(up) = &request.up {
+            self.key("up", quoted(up));
+        }
+        if let Some(unit) = &request.unit {
+            match unit.parse::<f32>() {
+                Ok(number) => self.key("unit", float(number)),
+                Err(_) => self.key("unit", quoted(unit)),
+            }
+        }
+        if brings_lights(&request.mesh) {
+            self.key(
+                "lights",
+                "\"ignore\"  # \"file\": those that the file brings",
+            );
+        }
+        if let Some(levels) = request.subdivide {
+            self.key("subdivide", levels);
+        }
         if request.smooth_normals {
             self.key("normals", quoted("smooth"));
         }

@@ -23,8 +23,7 @@ fn follows(what: &str, scene: &Scene, cap: Cap) {
             what,
             fineness,
             |random| {
-                let choice = random.number();
-                let sample = lights.sample(0, &receiver, choice, random.point());
+                let sample = lights.sample(0, &receiver, random.point());
                 (sample.pdf > 0.0).then_some(sample.direction)
             },
             |direction| density(input, &lights, &receiver, direction),
