@@ -69,7 +69,8 @@ pub fn framed(
     let whole = normal.dot(base[0].cross(base[1]));
     // Less is a frame that is a line, or one that the displacement folds.
     const LEAST: f64 = 1e-3;
-    if !(area * whole.signum() > LEAST * whole.abs()) {
+    let is_sound = area * whole.signum() > LEAST * whole.abs();
+    if !is_sound {
         return None;
     }
     let rise = |slope: DVec2| (slope.x * b.cross(normal) + slope.y * normal.cross(a)) / area;
