@@ -2,9 +2,20 @@
 
 use glam::Vec3;
 
-use super::bsdf::Parameters;
+use super::bsdf::{self, Parameters};
 use crate::scene::{Material, Scalar};
 use crate::surface::SurfacePoint;
+
+/// Makes what tables these materials look up, once per process.
+pub fn make_tables(materials: &[Material]) {
+    let is_sheen = |material: &Material| !material.sheen_color.is_black();
+    let is_rough_glass =
+        |material: &Material| material.is_transmissive() && !material.roughness.is(0.0);
+    bsdf::make_tables(
+        materials.iter().any(is_sheen),
+        materials.iter().any(is_rough_glass),
+    );
+}
 
 /// The material at `point`. `eta` is the index of refraction beyond the surface over that on the viewer's side, and
 /// `inside` tells that the viewer is in the body. Values are clamped to 0 .. 1: nothing reflects more than it receives.

@@ -16,31 +16,29 @@ pub mod film;
 mod integrator;
 mod light;
 mod material;
+mod plan;
+mod renderer;
+mod run;
 mod sampler;
 mod shading;
 mod status;
 mod terminator;
 
-use std::ops::Range;
-use std::sync::Mutex;
-
 use glam::Vec3;
-use rayon::prelude::*;
 
 pub use film::to_srgb8;
 pub use integrator::RayCounts;
+pub use renderer::{Budget, Renderer, Step};
+pub use run::{Control, Outcome};
 pub use status::Status;
 
 use crate::ray::{Cone, Ray};
 use crate::scene::{Camera, Film, Integrator, Light, Material};
 use crate::surface::SurfacePoint;
 use crate::trace::{Hit, PlacedObject, Tracer, World};
-use film::{Frame, Objects, TileGrid, TileRenderer};
-
-/// Most pixels along a tile's side.
-const TILE: u32 = 32;
-/// Most samples of a tile: the last tiles keep all threads busy.
-const TILE_SAMPLES: u32 = TILE * TILE * 16;
+use film::{Frame, Objects};
+use plan::Plan;
+use run::{Tables, run};
 
 /// What the renderer asks of a hit.
 pub trait Surfaces: Sync {
@@ -120,7 +118,7 @@ pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
     integrator::enclosing_object(input)
 }
 
-/// A finished picture.
+/// A picture, finished or as it is.
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// Pixels across.
@@ -129,6 +127,8 @@ pub struct Picture {
     pub height: u32,
     /// Linear radiance, finite, row by row from the top left. Exposure and tone curve are not applied.
     pub pixels: Vec<Vec3>,
+    /// Samples behind each pixel; where there are none the pixel is black, and that means nothing.
+    pub samples: Vec<u32>,
     /// What it took.
     pub stats: RenderStats,
 }
@@ -157,58 +157,23 @@ pub fn render(input: &RenderInput, progress: &(dyn Fn(&Status) + Sync)) -> Pictu
         ..Control::default()
     };
     let outcome = render_frame(input, &mut frame, control);
-    Picture::new(&frame, &outcome)
+    Picture::new(&frame, outcome.rays)
 }
 
 impl Picture {
-    fn new(frame: &Frame, outcome: &Outcome) -> Self {
+    fn new(frame: &Frame, rays: RayCounts) -> Self {
         let size = frame.window().size();
         Self {
             width: size.x,
             height: size.y,
             pixels: frame.radiance(),
+            samples: frame.sample_counts(),
             stats: RenderStats {
-                rays: outcome.rays,
+                rays,
                 dropped_samples: frame.dropped(),
             },
         }
     }
-}
-
-/// How a run is watched and stopped.
-pub struct Control<'a> {
-    /// Called once per finished tile and in order, from any thread; no other tile is put into the picture meanwhile.
-    pub progress: &'a (dyn Fn(&Status) + Sync),
-    /// Called with every tile, finished or stopped, before it is put into the picture, from any thread and in no order.
-    pub tile_done: &'a (dyn Fn(&Frame) + Sync),
-    /// Asked before every sample, from any thread; what is done stays when it says true.
-    pub stop: &'a (dyn Fn() -> bool + Sync),
-    /// Called between two passes.
-    pub pass: Option<&'a mut dyn FnMut(&Frame)>,
-    /// Pixels along a tile's side, instead of what keeps all threads busy; at least 1.
-    pub tile: Option<u32>,
-}
-
-impl Default for Control<'_> {
-    /// Neither watched nor stopped.
-    fn default() -> Self {
-        Self {
-            progress: &|_| (),
-            tile_done: &|_| (),
-            stop: &|| false,
-            pass: None,
-            tile: None,
-        }
-    }
-}
-
-/// What became of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    /// Rays traced.
-    pub rays: RayCounts,
-    /// Whether it was stopped before its end.
-    pub stopped: bool,
 }
 
 /// Gives the pixels of `frame` the samples that they still lack. The frame's bits depend neither on the threads nor on
@@ -216,83 +181,10 @@ pub struct Outcome {
 ///
 /// # Panics
 /// As [`render()`].
-pub fn render_frame(input: &RenderInput, frame: &mut Frame, mut control: Control) -> Outcome {
-    let integrator = integrator::prepare(input);
-    let renderer = TileRenderer::new(input.camera, input.film, input.tracer, &*integrator);
-    let passes = passes(frame.samples(), input.film.progressive);
-    let grids = passes.iter().map(|pass| {
-        let side = control.tile.unwrap_or_else(|| tile_side(pass.len() as u32));
-        TileGrid::new(frame.window(), side)
-    });
-    let grids: Vec<TileGrid> = grids.collect();
-    let total = frame.lacks(frame.samples());
-    let mut outcome = Outcome {
-        rays: RayCounts::default(),
-        stopped: false,
-    };
-    let mut done = 0;
-    for (number, (pass, grid)) in (1..).zip(passes.iter().zip(&grids)) {
-        let (progress, tile_done, stop) = (control.progress, control.tile_done, control.stop);
-        let assembly = Mutex::new((&mut *frame, &mut outcome, &mut done));
-        (0..grid.len())
-            .into_par_iter()
-            .with_max_len(1)
-            .for_each(|index| {
-                // A poisoned lock means that another tile panicked: the panic is on its way to the caller.
-                let Ok(mut tile) = assembly.lock().map(|a| a.0.part(grid.tile(index))) else {
-                    return;
-                };
-                let lacked = tile.lacks(pass);
-                let result = renderer.render(&mut tile, pass.end, stop);
-                tile_done(&tile);
-                if let Ok(mut assembly) = assembly.lock() {
-                    let (frame, outcome, done) = &mut *assembly;
-                    frame.place(&tile);
-                    outcome.rays += result.rays;
-                    outcome.stopped |= result.stopped;
-                    if !result.stopped {
-                        **done += lacked;
-                        progress(&Status {
-                            frame,
-                            done: **done,
-                            total,
-                            pass: number,
-                            passes: passes.len(),
-                            rays: outcome.rays,
-                        });
-                    }
-                }
-            });
-        if outcome.stopped {
-            break;
-        }
-        if let Some(pass) = control.pass.as_mut().filter(|_| number < passes.len()) {
-            pass(frame);
-        }
-    }
-    outcome
-}
-
-/// The runs of samples that are taken one after the other: all at once, or each as long as all before.
-fn passes(samples: &Range<u32>, progressive: bool) -> Vec<Range<u32>> {
-    let mut passes = Vec::new();
-    let mut start = samples.start;
-    while start < samples.end {
-        let done = start - samples.start;
-        let end = if progressive {
-            start.saturating_add(done.max(1))
-        } else {
-            samples.end
-        };
-        passes.push(start..end.min(samples.end));
-        start = end;
-    }
-    passes
-}
-
-/// Pixels along the side of tiles that take so many samples per pixel.
-fn tile_side(spp: u32) -> u32 {
-    (TILE_SAMPLES / spp.max(1)).isqrt().clamp(1, TILE)
+pub fn render_frame(input: &RenderInput, frame: &mut Frame, control: Control) -> Outcome {
+    let tables = Tables::new(input);
+    let mut plan = Plan::new(frame, input.film.progressive, control.tile);
+    run(input, &tables, frame, &mut plan, control)
 }
 
 #[cfg(test)]

@@ -1,7 +1,11 @@
 //! Whole pictures of shapes whose answers are known.
 
 mod film;
+#[cfg(feature = "bvh")]
+mod renderer;
+mod run;
 
+use std::ops::Range;
 use std::sync::Mutex;
 
 use glam::{Vec2, Vec3};
@@ -190,7 +194,7 @@ impl Setup {
     fn render_tiled(&self, tile: u32) -> Picture {
         let mut frame = Frame::new(&self.film, 0..self.film.spp, Objects::default());
         let outcome = self.go_on(&mut frame, tile);
-        Picture::new(&frame, &outcome)
+        Picture::new(&frame, outcome.rays)
     }
 
     fn mean(&self) -> Vec3 {

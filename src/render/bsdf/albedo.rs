@@ -28,6 +28,17 @@ const GAUSS: [(f32, f32); 5] = [
     (0.953_089_9, 0.118_463_44),
 ];
 
+/// Makes the tables now, that of sheen and that of rough glass where these are asked for, so that no sample waits for them.
+pub fn make_tables(sheen: bool, rough_glass: bool) {
+    LazyLock::force(&REFLECTION_MEANS);
+    if sheen {
+        LazyLock::force(&SHEEN);
+    }
+    if rough_glass {
+        LazyLock::force(&GLASS);
+    }
+}
+
 /// The cosine-weighted mean of `f(cos)` over the hemisphere.
 pub fn hemisphere_mean(f: impl Fn(f32) -> f32) -> f32 {
     GAUSS.iter().map(|&(cos, w)| w * 2.0 * cos * f(cos)).sum()

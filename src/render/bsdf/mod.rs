@@ -23,6 +23,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
+pub use albedo::make_tables;
 use fresnel::{reflect, schlick};
 use glass::{Glass, Ways};
 pub use parameters::Parameters;

@@ -156,13 +156,27 @@ impl Frame {
 
     /// Linear radiance of the pixels, row by row from the top; black where there is none.
     pub fn radiance(&self) -> Vec<Vec3> {
-        let pixels = 0..self.counts.len();
-        pixels
-            .map(|index| {
-                let pixel = self.pixel(index);
-                Vec3::new(pixel.value(0), pixel.value(1), pixel.value(2))
-            })
-            .collect()
+        // Every layout begins with these three.
+        let sums = self.sums.chunks_exact(self.layout.slots().len());
+        let pixels = self.counts.iter().zip(sums);
+        let radiance = |(counts, sums): (&Counts, &[f64])| {
+            Vec3::from([0, 1, 2].map(|slot| counts.value(slot, sums[slot])))
+        };
+        pixels.map(radiance).collect()
+    }
+
+    /// Samples in the means of the pixels, row by row from the top.
+    pub fn sample_counts(&self) -> Vec<u32> {
+        self.counts.iter().map(|counts| counts.samples).collect()
+    }
+
+    /// Takes all samples away.
+    pub(in crate::render) fn clear(&mut self) {
+        let none = Pixel::default();
+        self.counts.fill(none.counts);
+        self.sums.fill(0.0);
+        self.shares.fill(none.objects);
+        self.prims.fill(none.prim);
     }
 
     /// The pixel of this index, row by row from the top.

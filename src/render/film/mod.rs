@@ -27,6 +27,7 @@ mod tone;
 
 pub use error::FrameError;
 pub use file::FrameFile;
+pub(super) use filter::PixelFilter;
 pub use frame::Frame;
 pub use info::{FrameInfo, Part, Source};
 pub use merge::merge;

@@ -27,6 +27,24 @@ impl Counts {
     pub fn taken(&self) -> u32 {
         self.samples + self.dropped
     }
+
+    /// The value of sum `slot`, where it is `sum`; 0 where there is nothing to divide by.
+    pub fn value(&self, slot: usize, sum: f64) -> f32 {
+        let divisor = self.divisor(slot);
+        if divisor == 0.0 {
+            return 0.0;
+        }
+        (sum / divisor) as f32
+    }
+
+    fn divisor(&self, slot: usize) -> f64 {
+        match ALL[slot].kind {
+            Kind::Filtered => self.weight.into(),
+            Kind::OfHits => self.hits.into(),
+            Kind::Mean => 1.0,
+            Kind::Deviations => self.samples.saturating_sub(1).into(),
+        }
+    }
 }
 
 /// An object in a pixel.
@@ -184,32 +202,13 @@ impl Pixel {
 
     /// The value of sum `slot`; 0 where there is nothing to divide by.
     pub fn value(&self, slot: usize) -> f32 {
-        let divisor = self.divisor(slot);
-        if divisor == 0.0 {
-            return 0.0;
-        }
-        (self.sums[slot] / divisor) as f32
+        self.counts.value(slot, self.sums[slot])
     }
 
     /// Sets sum `slot` so that its value is `value` again, to the bit: the product of 24 and at most 21 bits is
     /// exact in f64, and so is what dividing it gives back. The counts are set before.
     pub fn set_value(&mut self, slot: usize, value: f32) {
-        self.sums[slot] = f64::from(value) * self.divisor(slot);
-    }
-
-    fn divisor(&self, slot: usize) -> f64 {
-        let Counts {
-            samples,
-            hits,
-            weight,
-            ..
-        } = self.counts;
-        match ALL[slot].kind {
-            Kind::Filtered => weight.into(),
-            Kind::OfHits => hits.into(),
-            Kind::Mean => 1.0,
-            Kind::Deviations => samples.saturating_sub(1).into(),
-        }
+        self.sums[slot] = f64::from(value) * self.counts.divisor(slot);
     }
 }
 

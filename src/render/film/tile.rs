@@ -19,7 +19,7 @@ pub struct TileRenderer<'a> {
     eye: Vec3,
     /// Depth is measured along this from the eye; from a panorama it is the distance.
     view: Option<Vec3>,
-    filter: PixelFilter,
+    filter: &'a PixelFilter,
     tracer: &'a dyn Tracer,
     /// Whether camera rays are traced eight by eight.
     in_packets: bool,
@@ -44,10 +44,11 @@ pub struct TileOutcome {
 }
 
 impl<'a> TileRenderer<'a> {
-    /// Pictures of `film` through `camera`.
+    /// Pictures of `film`, whose filter is `filter`, through `camera`.
     pub fn new(
         camera: &Camera,
         film: &Film,
+        filter: &'a PixelFilter,
         tracer: &'a dyn Tracer,
         integrator: &'a dyn Integrator,
     ) -> Self {
@@ -56,7 +57,7 @@ impl<'a> TileRenderer<'a> {
             eye: camera.position,
             view: (camera.projection != Projection::Panorama)
                 .then(|| (camera.target - camera.position).normalize_or(Vec3::NEG_Z)),
-            filter: PixelFilter::new(film.filter),
+            filter,
             tracer,
             in_packets: film.spp >= RayPacket::LANES as u32,
             integrator,
@@ -213,6 +214,7 @@ mod tests {
     use super::*;
     use crate::ray::Aabb;
     use crate::render::film::{CameraSample, Objects};
+    use crate::scene::Filter;
 
     /// An empty scene that is asked either about single rays or about full packets.
     struct Nothing {
@@ -250,7 +252,8 @@ mod tests {
             let film = Film { spp, ..film() };
             let in_packets = spp >= 8;
             let mut frame = Frame::new(&film, 0..spp, Objects::default());
-            TileRenderer::new(&Camera::default(), &film, &Nothing { in_packets }, &Broken).render(
+            let (filter, tracer) = (PixelFilter::new(film.filter), Nothing { in_packets });
+            TileRenderer::new(&Camera::default(), &film, &filter, &tracer, &Broken).render(
                 &mut frame,
                 spp,
                 &|| false,
@@ -305,11 +308,9 @@ mod tests {
     fn a_broken_sample_is_counted_and_never_spreads() {
         let film = film();
         let mut frame = Frame::new(&film, 0..32, Objects::default());
-        let outcome = TileRenderer::new(&Camera::default(), &film, &EMPTY, &Broken).render(
-            &mut frame,
-            32,
-            &|| false,
-        );
+        let filter = PixelFilter::new(film.filter);
+        let outcome = TileRenderer::new(&Camera::default(), &film, &filter, &EMPTY, &Broken)
+            .render(&mut frame, 32, &|| false);
         assert!(frame.radiance().iter().all(|&p| p == Vec3::ONE));
         assert_eq!(outcome.rays.camera, 8 * 8 * 32);
         assert!(frame.is_complete() && !outcome.stopped);
@@ -320,7 +321,8 @@ mod tests {
     #[test]
     fn a_stopped_tile_goes_on_to_the_same_bits() {
         let film = film();
-        let renderer = TileRenderer::new(&Camera::default(), &film, &EMPTY, &Broken);
+        let filter = PixelFilter::new(film.filter);
+        let renderer = TileRenderer::new(&Camera::default(), &film, &filter, &EMPTY, &Broken);
         let mut whole = Frame::new(&film, 0..32, Objects::default());
         let mut stopped = whole.clone();
         renderer.render(&mut whole, 32, &|| false);
@@ -341,8 +343,10 @@ mod tests {
     fn depth_is_along_the_view_but_for_panoramas() {
         let mut camera = Camera::default();
         let aside = Vec3::new(3.0, 0.0, -4.0);
-        let depth =
-            |camera: &Camera| TileRenderer::new(camera, &film(), &EMPTY, &Broken).depth(aside);
+        let (film, filter) = (film(), PixelFilter::new(Filter::default()));
+        let depth = |camera: &Camera| {
+            TileRenderer::new(camera, &film, &filter, &EMPTY, &Broken).depth(aside)
+        };
         assert_eq!(depth(&camera), 4.0);
         camera.projection = Projection::Panorama;
         assert_eq!(depth(&camera), 5.0);

@@ -9,6 +9,8 @@ mod view;
 use super::RenderInput;
 use super::bsdf::Bounce;
 use super::film::CameraSample;
+use super::light::LightTables;
+use super::material;
 use super::sampler::Sampler;
 use crate::ray::Ray;
 use crate::scene;
@@ -84,15 +86,38 @@ pub fn enclosing_object(input: &RenderInput) -> Option<usize> {
     stage::Stage::new(input).enclosing_object(input.camera.position, !is_dark)
 }
 
-/// The integrator that a scene asks for.
-pub fn prepare<'a>(input: &RenderInput<'a>) -> Box<dyn Integrator + 'a> {
-    match *input.integrator {
-        scene::Integrator::Path(limits) => {
-            Box::new(path::Path::new(input, path::Options::global(limits)))
+/// The integrator that a scene asks for, and the tables that it looks things up in. They depend on neither camera nor film.
+pub enum Prepared {
+    /// Paths.
+    Path(path::Options, LightTables),
+    /// Ambient occlusion up to this distance.
+    Ao(f32),
+    /// A view.
+    View(scene::View),
+}
+
+impl Prepared {
+    /// Makes the tables for `input`.
+    pub fn new(input: &RenderInput) -> Self {
+        let path = |options: path::Options| {
+            material::make_tables(input.materials);
+            Self::Path(options, options.tables(input))
+        };
+        match *input.integrator {
+            scene::Integrator::Path(limits) => path(path::Options::global(limits)),
+            scene::Integrator::Beauty => path(path::Options::beauty()),
+            scene::Integrator::Ao { distance } => Self::Ao(distance),
+            scene::Integrator::View(view) => Self::View(view),
         }
-        scene::Integrator::Beauty => Box::new(path::Path::new(input, path::Options::beauty())),
-        scene::Integrator::Ao { distance } => Box::new(ao::Ao::new(input, distance)),
-        scene::Integrator::View(view) => Box::new(view::Look::new(input, view)),
+    }
+
+    /// The integrator for `input`, which differs from that of [`Prepared::new`] in tracer, camera and film at most.
+    pub fn integrator<'a>(&'a self, input: &RenderInput<'a>) -> Box<dyn Integrator + 'a> {
+        match self {
+            Self::Path(options, tables) => Box::new(path::Path::new(input, tables, *options)),
+            Self::Ao(distance) => Box::new(ao::Ao::new(input, *distance)),
+            Self::View(view) => Box::new(view::Look::new(input, *view)),
+        }
     }
 }
 

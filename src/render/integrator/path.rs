@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::super::RenderInput;
 use super::super::bsdf::{Allowed, Bounce, SMOOTHEST_WHEN_LAST};
 use super::super::film::{CameraSample, FirstHit};
-use super::super::light::{Lights, Receiver};
+use super::super::light::{LightTables, Lights, Receiver};
 use super::super::material;
 use super::super::sampler::{Dimension, Purpose, Sampler};
 use super::super::shading::ShadedPoint;
@@ -67,6 +67,11 @@ impl Options {
         }
     }
 
+    /// The lights of `input` for such paths.
+    pub fn tables(&self, input: &RenderInput) -> LightTables {
+        LightTables::new(input, self.preview)
+    }
+
     /// The same with other weights.
     #[cfg(all(test, feature = "bvh"))]
     pub fn weighed(self, heuristic: Heuristic) -> Self {
@@ -117,12 +122,12 @@ struct Bounces {
 }
 
 impl<'a> Path<'a> {
-    /// Prepares the lights of `input`.
-    pub fn new(input: &RenderInput<'a>, options: Options) -> Self {
+    /// Paths through `input`, whose lights `tables` are [made of](Options::tables).
+    pub fn new(input: &RenderInput<'a>, tables: &'a LightTables, options: Options) -> Self {
         let stage = Stage::new(input);
         Self {
             stage,
-            lights: Lights::new(input, options.preview),
+            lights: Lights::new(tables, input),
             materials: input.materials,
             options,
             around_camera: stage.bodies_at(input.camera.position),

@@ -30,6 +30,11 @@ const BY_AREA: f64 = 0.1;
 pub struct MeshLights<'a> {
     surfaces: &'a dyn Surfaces,
     materials: &'a [Material],
+    tables: &'a MeshTables,
+}
+
+/// Which they are, and how one of their triangles is chosen.
+pub struct MeshTables {
     placed: Vec<Emitter>,
     choice: Cumulative,
     power: f32,
@@ -42,9 +47,9 @@ struct Emitter {
     first: usize,
 }
 
-impl<'a> MeshLights<'a> {
+impl MeshTables {
     /// The emissive surfaces of `input`; `None` where nothing shines.
-    pub fn new(input: &RenderInput<'a>) -> Option<Self> {
+    pub fn new(input: &RenderInput) -> Option<Self> {
         let mut placed = Vec::new();
         let (mut areas, mut powers) = (Vec::new(), Vec::new());
         for object in input.surfaces.placed() {
@@ -72,8 +77,6 @@ impl<'a> MeshLights<'a> {
         let weights = areas.iter().zip(&powers);
         let weights = weights.map(|(a, p)| BY_AREA * a / area + (1.0 - BY_AREA) * p / power);
         Some(Self {
-            surfaces: input.surfaces,
-            materials: input.materials,
             placed,
             choice: Cumulative::new(weights),
             power: power as f32,
@@ -84,12 +87,24 @@ impl<'a> MeshLights<'a> {
     pub fn power(&self) -> f32 {
         self.power
     }
+}
+
+impl<'a> MeshLights<'a> {
+    /// Those that `tables` were made of, which are in `input`.
+    pub fn new(tables: &'a MeshTables, input: &RenderInput<'a>) -> Self {
+        Self {
+            surfaces: input.surfaces,
+            materials: input.materials,
+            tables,
+        }
+    }
 
     /// A point of an emissive surface, seen from `position`.
     pub fn sample(&self, position: Vec3, u: Vec2) -> LightSample {
-        let (index, rest) = self.choice.choose(u.x);
+        let placed = &self.tables.placed;
+        let (index, rest) = self.tables.choice.choose(u.x);
         // The last that begins at or before it.
-        let emitter = &self.placed[self.placed.partition_point(|e| e.first <= index) - 1];
+        let emitter = &placed[placed.partition_point(|e| e.first <= index) - 1];
         let prim = (index - emitter.first) as u32;
         let hit = emitter.object.hit(prim, barycentric(Vec2::new(rest, u.y)));
         let point = self.surfaces.point(&hit);
@@ -112,10 +127,9 @@ impl<'a> MeshLights<'a> {
 
     /// The density per steradian, seen from `position`, with which [`Self::sample`] finds what a ray hit.
     pub fn pdf(&self, hit: &Hit, point: &SurfacePoint, position: Vec3) -> f32 {
-        let emitter = self
-            .placed
-            .binary_search_by_key(&hit.top(), |e| e.object.top);
-        match emitter.map(|i| &self.placed[i]) {
+        let placed = &self.tables.placed;
+        let emitter = placed.binary_search_by_key(&hit.top(), |e| e.object.top);
+        match emitter.map(|i| &placed[i]) {
             Ok(e) if hit.prim < e.object.triangles => {
                 self.density(e.first + hit.prim as usize, hit, point, position)
             }
@@ -129,7 +143,7 @@ impl<'a> MeshLights<'a> {
         };
         let to = point.position - position;
         let cosine = (point.geometric_normal.dot(to) / to.length()).abs();
-        let per_area = 2.0 * self.choice.probability(index) / element;
+        let per_area = 2.0 * self.tables.choice.probability(index) / element;
         per_area * to.length_squared() / cosine
     }
 }

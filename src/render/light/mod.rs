@@ -11,33 +11,28 @@ mod shape;
 mod sky;
 mod sphere_distribution;
 mod sun;
+mod tables;
 mod white;
-
-use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
 pub use environment::Environment;
 pub use sky::Sky;
 pub use sun::Sun;
+pub use tables::LightTables;
 pub use white::WhiteWorld;
 
 use super::RenderInput;
 use crate::ray::Ray;
-use crate::scene::Light;
 use crate::surface::SurfacePoint;
 use crate::trace::Hit;
-use cumulative::Cumulative;
 use mesh::MeshLights;
-use point::{Cone, DirectionalLight, PointLight};
+use point::{DirectionalLight, PointLight};
 use shape::{FlatLight, SphereLight};
 
 /// Luminance, in kcd/m^2, of radiance 1: about that of a white wall in full sun, so that daylight exposes
 /// well at exposure 0.
 const KILOCANDELA_PER_UNIT: f32 = 25.0;
-
-/// Turbidity of a sun without a sky.
-const CLEAR: f32 = 3.0;
 
 /// A direction that a light was sampled in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,97 +114,54 @@ pub struct Receiver {
 
 /// All lights of a scene.
 pub struct Lights<'a> {
-    infinite: Vec<Infinite>,
-    local: Vec<Local>,
+    tables: &'a LightTables,
     meshes: Option<MeshLights<'a>>,
-    choice: Cumulative,
-    /// Whether each point is lit by all of them, or by one.
-    all: bool,
 }
 
 impl<'a> Lights<'a> {
-    /// The lights of `input`, ready to be sampled: all at each point, or one that is chosen by its power. A scene
-    /// without any is lit by a white world of radiance 1.
-    ///
-    /// A sun is seen through the air of the first sky, or through clear air.
-    pub fn new(input: &RenderInput<'a>, all: bool) -> Self {
-        let meshes = MeshLights::new(input);
-        let air = input.lights.iter().find_map(|light| match light {
-            Light::Sky { turbidity, .. } => Some(*turbidity),
-            _ => None,
-        });
-        let (mut infinite, mut local) = (Vec::new(), Vec::new());
-        for light in input.lights {
-            match one(light, air.unwrap_or(CLEAR)) {
-                Prepared::Infinite(light) => infinite.push(light),
-                Prepared::Local(light) => local.push(light),
-            }
-        }
-        if input.lights.is_empty() && meshes.is_none() {
-            infinite.push(Infinite::White(WhiteWorld));
-        }
-        let radius = 0.5 * input.tracer.bounds().diagonal();
-        // What a light from afar sends through the disk that the scene shows it.
-        let disk = if radius.is_finite() && radius > 0.0 {
-            PI * radius * radius
-        } else {
-            1.0
-        };
-        let powers: Vec<f64> = infinite
-            .iter()
-            .map(|light| disk * light.brightness())
-            .chain(local.iter().map(|light| light.power()))
-            .chain(meshes.iter().map(MeshLights::power))
-            .map(f64::from)
-            .collect();
+    /// Those that `tables` were made of, which are in `input`.
+    pub fn new(tables: &'a LightTables, input: &RenderInput<'a>) -> Self {
+        let meshes = tables.meshes.as_ref();
         Self {
-            infinite,
-            local,
-            meshes,
-            choice: Cumulative::new(powers.into_iter()),
-            all,
+            meshes: meshes.map(|meshes| MeshLights::new(meshes, input)),
+            tables,
         }
     }
 
     /// How many samples light a point.
     pub fn samples(&self) -> usize {
-        if self.all { self.count() } else { 1 }
-    }
-
-    fn count(&self) -> usize {
-        self.infinite.len() + self.local.len() + usize::from(self.meshes.is_some())
+        if self.tables.all {
+            self.tables.count()
+        } else {
+            1
+        }
     }
 
     /// The sample of number `index` of a point's [`samples`](Self::samples); `u` is uniform in [0, 1)^2.
     pub fn sample(&self, index: usize, receiver: &Receiver, mut u: Vec2) -> LightSample {
-        let index = if self.all {
+        let index = if self.tables.all {
             index
         } else {
-            let (index, rest) = self.choice.choose(u.x);
+            let (index, rest) = self.tables.choice.choose(u.x);
             u.x = rest;
             index
         };
         let mut sample = self.of(index, receiver, u);
-        sample.pdf *= self.chance(index);
+        sample.pdf *= self.tables.chance(index);
         sample
     }
 
     fn of(&self, index: usize, receiver: &Receiver, u: Vec2) -> LightSample {
-        if let Some(light) = self.infinite.get(index) {
+        let LightTables {
+            infinite, local, ..
+        } = self.tables;
+        if let Some(light) = infinite.get(index) {
             return light.sample(receiver.normal, u);
         }
-        match (self.local.get(index - self.infinite.len()), &self.meshes) {
+        match (local.get(index - infinite.len()), &self.meshes) {
             (Some(light), _) => light.sample(receiver.position, u),
             (None, Some(meshes)) => meshes.sample(receiver.position, u),
             (None, None) => LightSample::NONE,
-        }
-    }
-
-    fn chance(&self, index: usize) -> f32 {
-        if self.all {
-            1.0
-        } else {
-            self.choice.probability(index)
         }
     }
 
@@ -222,21 +174,23 @@ impl<'a> Lights<'a> {
         receiver: Option<&Receiver>,
         mut found: impl FnMut(f32, Vec3, f32),
     ) {
+        let tables = self.tables;
         if reach == f32::INFINITY {
-            for (index, light) in self.infinite.iter().enumerate() {
+            for (index, light) in tables.infinite.iter().enumerate() {
                 let radiance = light.radiance(ray.direction);
                 if radiance != Vec3::ZERO {
                     let pdf = receiver.map_or(0.0, |r| light.pdf(r.normal, ray.direction));
-                    found(reach, radiance, self.chance(index) * pdf);
+                    found(reach, radiance, tables.chance(index) * pdf);
                 }
             }
         }
-        for (index, light) in self.local.iter().enumerate() {
+        for (index, light) in tables.local.iter().enumerate() {
             if let Some((t, radiance)) = light.meet(ray.origin, ray.direction)
                 && t < reach
             {
                 let pdf = receiver.map_or(0.0, |r| light.pdf(r.position, ray.direction));
-                found(t, radiance, self.chance(self.infinite.len() + index) * pdf);
+                let index = tables.infinite.len() + index;
+                found(t, radiance, tables.chance(index) * pdf);
             }
         }
     }
@@ -244,7 +198,7 @@ impl<'a> Lights<'a> {
     /// The density per steradian with which [`sample`](Self::sample) finds a shining surface from `receiver`.
     pub fn surface_pdf(&self, hit: &Hit, point: &SurfacePoint, receiver: &Receiver) -> f32 {
         let pdf = |meshes: &MeshLights| meshes.pdf(hit, point, receiver.position);
-        self.meshes.as_ref().map_or(0.0, pdf) * self.chance(self.count() - 1)
+        self.meshes.as_ref().map_or(0.0, pdf) * self.tables.chance(self.tables.count() - 1)
     }
 }
 
@@ -318,91 +272,6 @@ impl LocalLight for Local {
 
     fn power(&self) -> f32 {
         ask_local!(self, light => light.power())
-    }
-}
-
-/// A light ready to be sampled.
-enum Prepared {
-    Infinite(Infinite),
-    Local(Local),
-}
-
-fn one(light: &Light, air: f32) -> Prepared {
-    match *light {
-        Light::Sun {
-            direction,
-            strength,
-        } => Prepared::Infinite(Infinite::Sun(Sun::new(direction, air, strength))),
-        Light::Sky {
-            sun_direction,
-            turbidity,
-            strength,
-        } => Prepared::Infinite(Infinite::Sky(Sky::new(sun_direction, turbidity, strength))),
-        Light::Environment {
-            ref image,
-            rotation,
-            strength,
-        } => Prepared::Infinite(Infinite::Environment(Environment::new(
-            image.clone(),
-            rotation,
-            strength,
-        ))),
-        Light::Directional {
-            direction,
-            irradiance,
-        } => Prepared::Infinite(Infinite::Directional(DirectionalLight {
-            direction,
-            irradiance,
-        })),
-        Light::Sphere {
-            center,
-            radius,
-            radiance,
-        } => Prepared::Local(Local::Sphere(SphereLight {
-            center,
-            radius,
-            radiance,
-        })),
-        Light::Disk {
-            center,
-            normal,
-            radius,
-            radiance,
-        } => Prepared::Local(Local::Flat(FlatLight::disk(
-            center, normal, radius, radiance,
-        ))),
-        Light::Rectangle {
-            corner,
-            edges,
-            radiance,
-        } => Prepared::Local(Local::Flat(FlatLight::rectangle(corner, edges, radiance))),
-        Light::Point {
-            position,
-            intensity,
-            range,
-        } => Prepared::Local(Local::Point(PointLight {
-            position,
-            intensity,
-            range,
-            cone: None,
-        })),
-        Light::Spot {
-            position,
-            direction,
-            cos_outer,
-            cos_inner,
-            intensity,
-            range,
-        } => Prepared::Local(Local::Point(PointLight {
-            position,
-            intensity,
-            range,
-            cone: Some(Cone {
-                axis: direction,
-                cos_outer,
-                cos_inner,
-            }),
-        })),
     }
 }
 

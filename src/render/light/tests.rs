@@ -1,3 +1,6 @@
+use std::f32::consts::PI;
+
+use super::point::Cone;
 use super::*;
 use crate::render::testing::{Cap, Fineness, Random};
 

@@ -1,7 +1,7 @@
 //! All lights of a scene together: which is chosen, and where on it, against the density that the path tracer weighs by.
 
 use super::*;
-use crate::render::light::{Lights, Receiver};
+use crate::render::light::{LightTables, Lights, Receiver};
 use crate::render::testing::{Cap, Fineness};
 use crate::trace::RayOffset;
 
@@ -17,7 +17,8 @@ fn follows(what: &str, scene: &Scene, cap: Cap) {
         normal: Vec3::Z,
     };
     scene.with_input(|input| {
-        let lights = Lights::new(input, false);
+        let tables = LightTables::new(input, false);
+        let lights = Lights::new(&tables, input);
         assert_eq!(lights.samples(), 1);
         cap.assert_samples_follow(
             what,

@@ -71,7 +71,7 @@ impl Scene {
 
     /// The mean of `n` paths along rays that `ray` makes of uniform points.
     pub fn mean(&self, options: Options, n: u32, ray: impl Fn(Vec2) -> Ray) -> Vec3 {
-        self.with_input(|input| mean(&Path::new(input, options), n, ray))
+        self.with_input(|input| mean(&Path::new(input, &options.tables(input), options), n, ray))
     }
 
     /// What `look` makes of the scene.
