@@ -118,23 +118,27 @@ impl Facets {
     }
 
     /// The mean radiance along rays from `eye` through uniform points of a square film around the origin, over those that meet the surface. `fov`
-    /// is that of the film's height, radians.
-    pub fn mean(&self, eye: DVec3, fov: f64, matter: Matter, lamp: Lamp, paths: u32) -> f64 {
+    /// is that of the film's height, radians. And how far off that mean may be: its standard error.
+    pub fn mean(&self, eye: DVec3, fov: f64, matter: Matter, lamp: Lamp, paths: u32) -> [f64; 2] {
         let view = -eye.normalize();
         let right = view.cross(DVec3::Y).normalize();
         let up = right.cross(view);
         let half = (0.5 * fov).tan();
         let mut numbers = Numbers(7);
-        let (mut sum, mut count) = (0.0, 0u32);
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0u32);
         for _ in 0..paths {
             let film = half * (2.0 * numbers.point() - 1.0);
             let direction = (view + film.x * right + film.y * up).normalize();
             if let Some(met) = self.meet(eye, direction, f64::INFINITY) {
-                sum += self.radiance(eye, direction, met, matter, lamp, &mut numbers);
+                let radiance = self.radiance(eye, direction, met, matter, lamp, &mut numbers);
+                sum += radiance;
+                squares += radiance * radiance;
                 count += 1;
             }
         }
-        sum / f64::from(count)
+        let count = f64::from(count);
+        let mean = sum / count;
+        [mean, ((squares / count - mean * mean) / count).sqrt()]
     }
 
     /// Along a ray that met the surface.

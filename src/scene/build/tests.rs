@@ -6,7 +6,9 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::image::{write_png_gray16, write_png_rgb8};
+use crate::prism::PrismOptions;
 use crate::scene::{Color, Detail, Projection, Scalar};
+use crate::surface::Wrap;
 
 /// Two squares of two materials, the first displaced and coloured by its MTL.
 const OBJ: &str = "\

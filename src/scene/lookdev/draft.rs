@@ -119,6 +119,7 @@ impl Draft<'_> {
         guess(
             surface.map(),
             size,
+            request.uv_scale.abs().max_element(),
             (
                 Some(scale).filter(|&scale| scale != OPEN_SCALE),
                 request.midlevel.or(laid),
