@@ -10,7 +10,7 @@ mod scenes;
 use glam::DVec3;
 use prismarch::surface::ShadingNormals;
 use reference::{Facets, Lamp, Matter};
-use scenes::{Case, Look, case, mean};
+use scenes::{Case, Look, case, demo, mean};
 
 /// Paths of the reference; the 48x48 pixels of a picture have as many samples together, and a few more.
 const PATHS: u32 = 70_000;
@@ -42,6 +42,13 @@ const SQUARE: Lamp = Lamp::Rectangle {
     corner: DVec3::new(-2.0, 3.0, -1.0),
     edges: [DVec3::new(3.0, 0.0, 0.0), DVec3::new(0.0, 0.0, 3.0)],
     radiance: 2.0,
+};
+
+/// So large that paths find it by themselves.
+const CEILING: Lamp = Lamp::Rectangle {
+    corner: DVec3::new(-9.0, 4.0, -9.0),
+    edges: [DVec3::new(18.0, 0.0, 0.0), DVec3::new(0.0, 0.0, 18.0)],
+    radiance: 1.0,
 };
 
 const BEHIND: Lamp = Lamp::Rectangle {
@@ -138,7 +145,29 @@ fn metals_and_glass() {
     };
     hold("curved, soft", metal(0.16), Lamp::Sky, 0.01);
     hold("curved, soft", metal(0.5), Lamp::Sky, 0.01);
-    // The mirror image of the lamp moves with the normals.
-    hold("curved, soft", metal(0.16), SQUARE, 0.03);
+    hold("curved, soft", metal(0.16), CEILING, 0.01);
     hold("curved, soft", Matter::Glass { index: 1.5 }, BEHIND, 0.01);
+}
+
+/// Of as many texels as demos have no reference can be cut: smooth normals are held to the surface's own, which all else here holds.
+/// Both pictures have the same random numbers, so most of the noise is the same.
+#[test]
+fn demos() {
+    // Rings on a coarse cloth: what smoothing the cloth moves is more than elsewhere.
+    for (name, most) in [("asteroid", 0.01), ("stump", 0.01), ("chainmail", 0.016)] {
+        let case = demo(name);
+        for (light, lamp) in [("sky", Lamp::Sky), ("sun in front", in_front())] {
+            let look = Look {
+                matter: CHALK,
+                lamp,
+                is_mesh: false,
+                spp: SPP,
+            };
+            let [own, smooth] = [ShadingNormals::Geometric, ShadingNormals::Smooth]
+                .map(|normals| mean(&case, &look, normals));
+            let off = smooth / own - 1.0;
+            println!("{name}, {light}: {:+.2} % of {own:.4}", 100.0 * off);
+            assert!(off.abs() < most, "{name}, {light}: {smooth} for {own}");
+        }
+    }
 }

@@ -160,7 +160,8 @@ impl Renderer {
     /// Sampling begins again: after an edit of heights that the tracer has followed.
     ///
     /// Tables stay as they are. Where a displaced surface shines, the choice among its triangles goes by their areas and powers as they were when
-    /// the renderer was made: the picture stays right, and after large edits it has more noise than that of a new renderer.
+    /// the renderer was made, and so does that among lights, which knows the size of the scene: the picture stays right, but has other bits, and after large
+    /// edits more noise, than that of a new renderer.
     pub fn restart(&mut self) {
         self.frame.clear();
         self.plan = plan(&self.frame);

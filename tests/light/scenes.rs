@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use prismarch::bvh::BvhTracer;
+use prismarch::demo::{DEMOS, WriteOptions};
 use prismarch::prism::{March, Prisms};
 use prismarch::render::film::{Frame, Objects};
 use prismarch::render::{Control, RenderInput, render_frame};
 use prismarch::scene::{
-    AovSet, Camera, Color, Film, Filter, FilterShape, Integrator, Light, Material, PathLimits,
-    Scalar,
+    AovSet, Camera, Color, Film, Filter, FilterShape, Integrator, Light, Loaded, Material,
+    ObjectShape, PathLimits, Scalar,
 };
 use prismarch::surface::{
     DisplacedSurface, Displacement, DisplacementMap, MeshBuilder, NormalMode, ShadingNormals,
@@ -23,9 +24,10 @@ use super::reference::{Lamp, Matter};
 pub struct Case {
     pub name: &'static str,
     pub surface: DisplacedSurface,
-    /// Triangles along a base triangle's side that the reference cuts it in.
+    /// Triangles along a base triangle's side that the reference cuts it in; 0: too many texels for it.
     pub cuts: usize,
     pub eye: Vec3,
+    pub target: Vec3,
     /// Vertical, radians.
     pub fov: f32,
 }
@@ -139,6 +141,7 @@ pub fn cases() -> Vec<Case> {
         surface,
         cuts,
         eye: Vec3::new(1.2, 2.6, 2.2),
+        target: Vec3::ZERO,
         fov: 0.5,
     };
     let around = |name, surface, cuts| Case {
@@ -146,6 +149,7 @@ pub fn cases() -> Vec<Case> {
         surface,
         cuts,
         eye: Vec3::new(1.2, 2.6, 4.2),
+        target: Vec3::ZERO,
         fov: 0.45,
     };
     let upsampled = || upsampled(&noise(64), 64, 16);
@@ -173,6 +177,31 @@ pub fn cases() -> Vec<Case> {
             50,
         ),
     ]
+}
+
+/// The displaced mesh of a demo as the demo's camera sees it.
+pub fn demo(name: &'static str) -> Case {
+    let folder = tempfile::tempdir().unwrap();
+    let demo = DEMOS.iter().find(|demo| demo.name == name).unwrap();
+    let options = WriteOptions {
+        map_size: demo.map_size,
+        force: false,
+        picture: false,
+    };
+    let scene = demo.write(folder.path(), options).unwrap();
+    let scene = Loaded::from_file(&scene).unwrap().scene;
+    let mut surfaces = scene.objects.iter().filter_map(|o| match &o.shape {
+        ObjectShape::Displaced(surface, _) => Some(DisplacedSurface::clone(surface)),
+        ObjectShape::Plain(_) => None,
+    });
+    Case {
+        name,
+        surface: surfaces.next().unwrap(),
+        cuts: 0,
+        eye: scene.camera.position,
+        target: scene.camera.target,
+        fov: scene.camera.fov,
+    }
 }
 
 pub fn case(name: &str) -> Case {
@@ -309,7 +338,7 @@ fn picture(case: &Case, look: &Look, normals: ShadingNormals) -> f64 {
     let tracer = BvhTracer::new(&world).unwrap();
     let camera = Camera {
         position: case.eye,
-        target: Vec3::ZERO,
+        target: case.target,
         fov: case.fov,
         ..Camera::default()
     };
